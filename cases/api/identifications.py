@@ -135,7 +135,7 @@ def identified(
     task: Task,
     say: Callable[[str], None] = say_nothing,
 ) -> Identified:
-    """What ``identify`` finds of a scene and a task that are checked. Not collective.
+    """Identify parameters of a checked scene by a checked task. Not collective.
 
     Parameters
     ----------

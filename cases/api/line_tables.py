@@ -297,7 +297,7 @@ class AtRest:
     def sensitivity(
         self, parameters: str | Sequence[str] = (), *, droppers: bool = False
     ) -> xr.Dataset:
-        """What parameters change of the contact wires and the elasticity in the middle span.
+        """Changes of contact wires and elasticity in the middle span by parameters.
 
         Parameters
         ----------

@@ -241,7 +241,7 @@ def optima(
     warn: Callable[[str], None] = logger.warning,
     say: Callable[[str], None] = say_nothing,
 ) -> Made:
-    """What ``optimise`` finds. Not collective.
+    """The optima of a task, for ``optimise`` and its verb. Not collective.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ def tolerances(
     warn: Callable[[str], None] = logger.warning,
     say: Callable[[str], None] = say_nothing,
 ) -> Made:
-    """What ``tolerance`` finds. Not collective.
+    """The tolerances of a task, for ``tolerance`` and its verb. Not collective.
 
     Parameters
     ----------

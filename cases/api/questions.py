@@ -208,7 +208,7 @@ def find_speeds(
     direction: str | None,
     command: str = _PROGRAM,
 ) -> Answer:
-    """What ``highest_speeds`` makes a table of, with files if the marches have a folder.
+    """Find the highest speeds, and write files if the marches have a folder.
 
     Collective.
 
@@ -243,7 +243,7 @@ def find_separations(
     *,
     explained: bool = True,
 ) -> Answer:
-    """What ``separations`` makes a table of, with files if the marches have a folder.
+    """March the distances of two pantographs, and write files if the marches have a folder.
 
     Collective.
 

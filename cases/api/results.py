@@ -70,14 +70,14 @@ class Run:
         self,
         results: Results | None,
         folder: Path | None = None,
-        told: RunOutcome | None = None,
+        ended: RunOutcome | None = None,
     ) -> None:
         """Results that are open, or None to open those of the folder when they are asked for;
-        ``told`` is how the run ended, if this process made it."""
+        ``ended`` is how the run ended, if this process made it."""
         if results is not None:
             self._file = results
         self._folder = folder
-        self._told = told
+        self._ended = ended
         self._is_closed = False
         self.plot = Pictures(lambda: self._results, lambda: self._evaluated)
 
@@ -88,7 +88,7 @@ class Run:
 
     @property
     def _results(self) -> Results:
-        """What tables are read from."""
+        """The opened results of the run."""
         if self._is_closed:
             raise InputError("this run is closed; read tables before, or open its folder again")
         return self._file
@@ -113,7 +113,7 @@ class Run:
         >>> run.outcome
         'done'
         """
-        return self._file.outcome if self._told is None else self._told.outcome
+        return self._file.outcome if self._ended is None else self._ended.outcome
 
     @cached_property
     def scene(self) -> Scene:
@@ -154,8 +154,8 @@ class Run:
 
     @cached_property
     def _summary(self) -> dict[str, Any]:
-        if self._told is not None and self._told.summary:
-            return self._told.summary
+        if self._ended is not None and self._ended.summary:
+            return self._ended.summary
         from catenary.postproc.evaluate.verdict import criteria_of
         from catenary.postproc.report.summary import summarise
 
@@ -171,7 +171,9 @@ class Run:
         >>> {"equilibrium", "march"} <= set(run.phase_wall)
         True
         """
-        return dict(self._summary["phase_wall_s"] if self._told is None else self._told.phase_wall)
+        return dict(
+            self._summary["phase_wall_s"] if self._ended is None else self._ended.phase_wall
+        )
 
     @property
     def statistics(self) -> pd.DataFrame:
@@ -462,8 +464,8 @@ class Run:
     def __reduce__(self) -> tuple[Callable[..., Run], tuple[Any, ...]]:
         """Processes give it to each other: by its folder, or with all of its file in memory."""
         if self._folder is None:
-            return _in_memory, (str(self._results.path), self._results.image(), self._told)
-        return Run, (None, self._folder.absolute(), self._told)
+            return _in_memory, (str(self._results.path), self._results.image(), self._ended)
+        return Run, (None, self._folder.absolute(), self._ended)
 
     def __enter__(self) -> Run:
         return self
@@ -494,7 +496,7 @@ def open(folder: str | Path) -> Run:
     Raises
     ------
     InputError
-        If there is no such file, or if it is so damaged that nothing can be told.
+        If there is no such file, or if it is so damaged that nothing can be read.
 
     Examples
     --------
@@ -517,13 +519,13 @@ def held(run: Run, comm: Any, in_memory: bool) -> Run:
     assert run.folder is not None
     path = run.folder / RUN_FILE
     if not in_memory:
-        return Run(Results(path), run.folder, run._told)
-    return _in_memory(path, on_root(comm, path.read_bytes), run._told)
+        return Run(Results(path), run.folder, run._ended)
+    return _in_memory(path, on_root(comm, path.read_bytes), run._ended)
 
 
-def _in_memory(path: str | Path, image: bytes, told: RunOutcome | None) -> Run:
+def _in_memory(path: str | Path, image: bytes, ended: RunOutcome | None) -> Run:
     """A run from the bytes of its file, which stood at ``path``."""
-    return Run(Results(path, image=image), None, told)
+    return Run(Results(path, image=image), None, ended)
 
 
 def _about(channel: channels.Channel) -> dict[str, str]:

@@ -160,14 +160,14 @@ def run_into(
     *,
     force: bool = False,
     only_summary: bool = False,
-    tell: Callable[[str], None] = lambda outcome: None,
+    on_closed: Callable[[str], None] = lambda outcome: None,
     ready: Callable[[], None] = lambda: None,
 ) -> Run:
     """A run into a folder, however it ends, of which no file is open. Collective.
 
     Parameters
     ----------
-    folder, scene, comm, force, only_summary, tell, ready
+    folder, scene, comm, force, only_summary, on_closed, ready
         As of ``cases.run.runner.run_case``.
     petsc_options : sequence of str
         Options that PETSc was started with, for the record.
@@ -193,7 +193,7 @@ def run_into(
             ranks,
             force=force,
             petsc_options=petsc_options,
-            tell=tell,
+            on_closed=on_closed,
             ready=ready,
             only_summary=only_summary,
         ),
@@ -244,13 +244,13 @@ def go_on(
     force: bool = False,
     extends: bool = False,
     only_summary: bool = False,
-    tell: Callable[[str], None] = lambda outcome: None,
+    on_closed: Callable[[str], None] = lambda outcome: None,
 ) -> Run:
     """A run that goes on, as of ``run_into``. Collective.
 
     Parameters
     ----------
-    folder, comm, force, extends, only_summary, tell
+    folder, comm, force, extends, only_summary, on_closed
         As of ``cases.run.runner.restart_case``.
     scene : Scene
         What ``scene_to_continue`` gave.
@@ -267,7 +267,7 @@ def go_on(
             folder,
             ranks,
             petsc_options=petsc_options,
-            tell=tell,
+            on_closed=on_closed,
             force=force,
             extends=extends,
             only_summary=only_summary,

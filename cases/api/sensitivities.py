@@ -81,7 +81,7 @@ def derivatives(
     droppers: bool = False,
     progress: bool = False,
 ) -> Derivatives:
-    """What ``sensitivity`` makes a table of. Not collective.
+    """Differentiate a march, for ``sensitivity`` and its verb. Not collective.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class RestDerivatives:
 def rest_derivatives(
     scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
 ) -> RestDerivatives:
-    """What ``AtRest.sensitivity`` gives, for the program. Not collective.
+    """Differentiate a line at rest, for ``AtRest.sensitivity`` and its verb. Not collective.
 
     Parameters
     ----------

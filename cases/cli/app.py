@@ -352,7 +352,7 @@ def records_of(folder: Path) -> Records | None:
     return examined(folder)
 
 
-def tell(text: str, files: Sequence[Path]) -> None:
+def print_findings(text: str, files: Sequence[Path]) -> None:
     """Print what a study found, and the files that it has written. Not collective."""
     console.say("\n" + text)
     if files:

@@ -76,7 +76,10 @@ def list_cases(
         console.say(key_table() if wanted is None else key_details(wanted))
         return
     if wanted is not None:
-        raise InputError(f"{wanted} filters keys: write `catenary list --keys {wanted}`")
+        raise InputError(
+            f"{wanted} filters keys or names a rule book: write `catenary list --keys {wanted}` or "
+            f"`catenary list --rules {wanted}`"
+        )
     if schema:
         import json
 

@@ -90,7 +90,7 @@ def main() -> None:
         # The output of --version, and that of --help by typer.
         if not isinstance(error, console.OutputLost) and not _OF_HELP.intersection(sys.argv):
             raise
-        code = console.tell_output_lost(error)
+        code = console.report_lost_output(error)
     except Exception as error:
         if not hasattr(error, "format_message") or not hasattr(error, "exit_code"):
             raise

@@ -9,7 +9,14 @@ import typer
 
 import catenary
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, Jobs, SceneWords, folder_option, serial_verb, tell
+from catenary.cases.cli.app import (
+    Force,
+    Jobs,
+    SceneWords,
+    folder_option,
+    print_findings,
+    serial_verb,
+)
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -142,5 +149,5 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
 
         console.say(json_text(output.record_of(found)).rstrip())
     else:
-        tell(output.as_text(found), files)
+        print_findings(output.as_text(found), files)
     return console.DONE

@@ -87,7 +87,7 @@ def run(
         arguments,
         force=runs.force,
         only_summary=no_report,
-        tell=_teller(out),
+        on_closed=_outcome_printer(out),
         ready=warn,
     )
     return _end(made, strict)
@@ -140,15 +140,15 @@ def restart(
         force=force,
         extends=until_m is not None,
         only_summary=no_report,
-        tell=_teller(folder),
+        on_closed=_outcome_printer(folder),
     )
     return _end(made, strict)
 
 
-def _teller(folder: Path) -> Callable[[str], None]:
+def _outcome_printer(folder: Path) -> Callable[[str], None]:
     """Prints how a run ended unless it is done. Not collective."""
 
-    def tell(outcome: str) -> None:
+    def print_outcome(outcome: str) -> None:
         if outcome == "interrupted":
             outcome = (
                 f"the run was interrupted; `catenary restart {quote(str(folder))}` continues it"
@@ -156,7 +156,7 @@ def _teller(folder: Path) -> Callable[[str], None]:
         if outcome != "done":
             console.complain(outcome)
 
-    return tell
+    return print_outcome
 
 
 def _end(made: catenary.Run, strict: bool) -> int:

@@ -111,7 +111,7 @@ def another_folder() -> str:
 
 
 def force_option() -> str:
-    """What lets results be replaced and large runs be run, for sentences."""
+    """The option that overwrites results and runs large runs, for sentences."""
     return option("--force", "force=True")
 
 

@@ -151,7 +151,7 @@ def run_case(
     *,
     force: bool = False,
     petsc_options: Sequence[str] = (),
-    tell: Callable[[str], None] = lambda outcome: None,
+    on_closed: Callable[[str], None] = lambda outcome: None,
     ready: Callable[[], None] = lambda: None,
     only_summary: bool = False,
     large: bool | None = None,
@@ -164,8 +164,8 @@ def run_case(
     scene : Scene, the same on all ranks
     force : whether results that are there may be replaced
     petsc_options : the options that PETSc was started with, for the record
-    tell : called with the outcome on all ranks when the result file is closed, before the report
-        is drawn: an MPI launcher that is interrupted leaves its processes a second
+    on_closed : called with the outcome on all ranks when the result file is closed, before the
+        report is drawn: an MPI launcher that is interrupted leaves its processes a second
     ready : called on all ranks when folder and size of the run have been judged
     only_summary : write ``summary.json`` in place of the report, which costs no time
     large : whether a run may pass the bounds on its size; as ``force`` if not given
@@ -182,7 +182,7 @@ def run_case(
     """
     allowed = force if large is None else large
     order = _Order(
-        scene, out_dir, comm, petsc_options, tell, None, only_summary, ready, excited=excited
+        scene, out_dir, comm, petsc_options, on_closed, None, only_summary, ready, excited=excited
     )
     with held(out_dir, comm, f"catenary run {scene.case.name}"):
         on_root(comm, lambda: prepare(out_dir, force))
@@ -195,7 +195,7 @@ def restart_case(
     comm: Any,
     *,
     petsc_options: Sequence[str] = (),
-    tell: Callable[[str], None] = lambda outcome: None,
+    on_closed: Callable[[str], None] = lambda outcome: None,
     force: bool = False,
     extends: bool = False,
     only_summary: bool = False,
@@ -204,8 +204,8 @@ def restart_case(
 
     ``scene`` must be the one that the run was started with; any number of ranks may continue.
     With ``extends`` it may have a later end and another evaluated stretch, and the run may be done.
-    ``petsc_options``, ``tell`` and ``only_summary`` are those of ``run_case``; with ``force`` the
-    room on the disk is not looked at.
+    ``petsc_options``, ``on_closed`` and ``only_summary`` are those of ``run_case``; with ``force``
+    the room on the disk is not looked at.
 
     Raises
     ------
@@ -218,7 +218,7 @@ def restart_case(
     with held(out_dir, comm, f"catenary restart {out_dir}"):
         state = on_root(comm, lambda: state_to_continue(out_dir / RUN_FILE, extends))
         order = _Order(
-            scene, out_dir, comm, petsc_options, tell, state, only_summary, extends=extends
+            scene, out_dir, comm, petsc_options, on_closed, state, only_summary, extends=extends
         )
         return _run(order, lambda size: check_room_to_continue(out_dir, size, force))
 
@@ -231,7 +231,7 @@ class _Order:
     out_dir: Path
     comm: Any
     petsc_options: Sequence[str]
-    tell: Callable[[str], None]
+    on_closed: Callable[[str], None]
     state: dict[str, Any] | None
     only_summary: bool
     ready: Callable[[], None] = lambda: None
@@ -258,7 +258,7 @@ def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
     outcome, n_unknowns = _marched(order, judge, phases)
     # The line is not needed any more: of a long one it is a gigabyte.
     give_back(n_unknowns)
-    order.tell(outcome.outcome)
+    order.on_closed(outcome.outcome)
     with phases("report"):
         result = _reported(order, outcome)
     result.phase_wall = dict(phases.wall)

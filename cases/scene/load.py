@@ -217,7 +217,7 @@ def scene_from(
 
 
 class Shared(NamedTuple):
-    """What a scene shares with a sound one: all tables but those that are ``changed``."""
+    """Tables that a scene shares with a sound one: all but the ``changed`` ones."""
 
     sound: Scene
     changed: Collection[str]

@@ -148,7 +148,7 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
         text = text.replace(old, new)
     body = re.sub(r"^# usual: .*\n", "", text[text.find("[line]") :], flags=re.MULTILINE)
     if not body.startswith("[line]"):
-        raise InputError(f"{path} has no table [line] to begin with")
+        raise InputError(f"{path} has no table [line], with which a new case begins; name another")
     if spans:
         body = _with_files(body, spans, droppers)
     origin = path.parent.name if path.name == CASE_FILE else path.stem
@@ -192,7 +192,9 @@ def _with_files(body: str, spans: Sequence[float], droppers: bool) -> str:
     least = _START + _SHORT_RUN_IN + _SHORT_JUDGED + _AFTER
     n, places = len(spans), [0.0, *itertools.accumulate(spans)]
     if n < least:
-        raise InputError(f"a new case needs {least} spans to run in, judge and run out, not {n}")
+        raise InputError(
+            f"--spans has {n} spans; a new case needs {least}, to run in, judge and run out"
+        )
     body = _edited(body, "line", {"n_spans": None, "span_m": None, "spans_file": f'"{SPANS_FILE}"'})
     if "\n[line.transition]" in body:  # the file has their lengths, too
         body = _edited(body, "line.transition", {"span_m": None})
@@ -220,7 +222,7 @@ def _edited(body: str, table: str, values: Mapping[str, str | None]) -> str:
     """The text with other values of keys of a table, as TOML; None takes a key away."""
     heading = re.search(rf"^\[{re.escape(table)}\].*\n", body, re.MULTILINE)
     if heading is None:
-        raise InputError(f"the case to begin with has no table [{table}]")
+        raise InputError(f"the case that --topology names has no table [{table}]; name another")
     end = re.compile(r"^\[", re.MULTILINE).search(body, heading.end())
     stop = len(body) if end is None else end.start()
     own = body[heading.end() : stop]

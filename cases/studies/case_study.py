@@ -142,7 +142,7 @@ def run(
 
 
 def _measured(path: Path, results: Results) -> dict[str, Any]:
-    """What the ``measure`` of a ``study.py`` takes from a result file; other processes load the
+    """Figures that ``measure`` of a ``study.py`` takes from a result file; other processes load the
     program again, as no package has it."""
     measured: dict[str, Any] = _load(path).measure(results)
     return measured

@@ -121,7 +121,7 @@ class Marched(NamedTuple):
     tables: Mapping[str, np.ndarray] = {}
 
     def summary(self) -> dict[str, Any]:
-        """As much of the summary that its own run writes as tables read, empty unless done."""
+        """The part of its run's summary that tables read, empty unless done."""
         if self.results is None:
             return {}
         statistics = stats.evaluate(self.results)

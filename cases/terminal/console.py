@@ -34,12 +34,12 @@ _BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _last_words: list[Callable[[], None]] = []
 
 
-def at_end(tell: Callable[[], None]) -> None:
-    """Call ``tell`` when the present verb has come to its end without an error.
+def at_end(print_last: Callable[[], None]) -> None:
+    """Call ``print_last`` when the present verb has come to its end without an error.
 
     Not collective.
     """
-    _last_words.append(tell)
+    _last_words.append(print_last)
 
 
 # When this module was loaded, where the system does not say when the process started.
@@ -97,16 +97,16 @@ def print_as_is(text: str) -> None:
 def complain(sentence: str) -> None:
     """Print one sentence to standard error on rank 0. Not collective."""
     if speaks():
-        _tell("catenary: ", sentence)
+        _print_error("catenary: ", sentence)
 
 
 def warn(sentence: str) -> None:
     """Print a warning to standard error on rank 0, unless quiet. Not collective."""
     if speaks() and not _quiet:
-        _tell("WARNING ", sentence)
+        _print_error("WARNING ", sentence)
 
 
-def _tell(head: str, sentence: str) -> None:
+def _print_error(head: str, sentence: str) -> None:
     """Print a sentence to standard error; where that cannot be written to nobody hears it."""
     try:
         typer.echo(head + plain(" ".join(sentence.split())), err=True)
@@ -137,7 +137,7 @@ def open_closed_streams() -> None:
             setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
 
 
-def tell_output_lost(error: OSError) -> int:
+def report_lost_output(error: OSError) -> int:
     """Say that standard output cannot be written to; returns the exit code. Not collective.
 
     Nothing is written there any more.
@@ -199,8 +199,8 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
                 kwargs[name] = group(**{field: kwargs.pop(field) for field in own})
             with command_line():
                 code = command(*args, **kwargs)
-                for tell in _last_words:
-                    tell()
+                for print_last in _last_words:
+                    print_last()
         except CatenaryError as error:
             complain(str(error))
             code = error.exit_code
@@ -211,7 +211,7 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
             complain("interrupted")
             code = BROKEN
         except OutputLost as error:
-            code = tell_output_lost(error)
+            code = report_lost_output(error)
         finally:
             # Of this command only: several may be called in one process.
             _quiet = False

@@ -15,6 +15,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import PydanticUndefined, core_schema
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
 from catenary.cases.scene.keys.table import OneOrMore
 from catenary.cases.scene.keys.units import unit_of
@@ -53,8 +54,6 @@ class Key:
 
 def keys_of_a_scene() -> list[Key]:
     """All keys of a scene, in the order of its tables."""
-    from catenary.cases.scene.scene import Scene
-
     return _keys_in(Scene, "")
 
 
@@ -143,8 +142,7 @@ def _chosen(wanted: str) -> list[Key]:
     parts = {part for key in every for part in key.name.split(".") if part != ANY}
     near = difflib.get_close_matches(low, sorted(parts), n=1)
     hint = f"did you mean {near[0]}?" if near else "`catenary list --keys` names all"
-    shown = "".join(c if c.isprintable() else "?" for c in wanted[:80])
-    raise InputError(f'no key of a scene fits "{shown}"; {hint}')
+    raise InputError(f'no key of a scene fits "{plain(wanted, 80)}"; {hint}')
 
 
 def _details(key: Key) -> str:
@@ -277,8 +275,7 @@ def criteria_text(name: str) -> str:
     try:
         book = book_named(name)
     except InputError as unknown:
-        shown = "".join(c if c.isprintable() else "?" for c in name[:80])
-        raise InputError(f'"{shown}": {unknown}') from None
+        raise InputError(f'"{plain(name, 80)}": {unknown}') from None
     lines = [f"{book.key}: {book.title}", *_folded(f"source: {' '.join(book.source.split())}")]
     for rule in book.criteria:
         lines += ["", *_about(book, rule)]

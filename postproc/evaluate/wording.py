@@ -12,7 +12,11 @@ UNCOMPARED_SAYS = f"{UNCOMPARED} limit not compared with the text of the standar
 
 def fixed(value: float, digits: int) -> str:
     """``value`` with so many decimals, without a sign where it is rounded to zero."""
-    text = f"{value:.{digits}f}"
+    return without_sign_of_zero(f"{value:.{digits}f}")
+
+
+def without_sign_of_zero(text: str) -> str:
+    """A number as ``text``, without a sign where it is zero."""
     return text.removeprefix("-") if not text.strip("-0.") else text
 
 

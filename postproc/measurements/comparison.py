@@ -243,9 +243,9 @@ class _Comparing:
         factor, length = np.sqrt(CERTAIN), found.length
         self.remarks.append(
             f"{name}: noise floor {found.residual:.2f} N (correlation {found.correlation:.3f}); "
-            f"told are a shift above {max(SHIFT, factor * found.shift.deviation):.2g} m, a drift "
-            f"above {max(DRIFTED, factor * found.drift.deviation * length):.2g} m, a gain above "
-            f"{100 * max(FORCE_SHARE, factor * found.gain.deviation):.2g} %"
+            f"reported are a shift above {max(SHIFT, factor * found.shift.deviation):.2g} m, a "
+            f"drift above {max(DRIFTED, factor * found.drift.deviation * length):.2g} m, a gain "
+            f"above {100 * max(FORCE_SHARE, factor * found.gain.deviation):.2g} %"
         )
         self._beyond_noise(name, "noise floor", "N", found.residual, stated)
 

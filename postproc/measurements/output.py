@@ -15,7 +15,7 @@ from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.measurements.compared import LINE_TEST, Comparison
 from catenary.postproc.report.page import page
 from catenary.postproc.report.sections.section import Picture, Section, Text
-from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.postproc.report.study_table import Column, StudyTable, file_table
 
 PAGE, SUMMARY, FIGURES = "measurement.html", "measurement.json", "figures.csv"
 FORCES, UPLIFTS = "forces.csv", "uplifts.csv"
@@ -102,15 +102,8 @@ def forces_table(found: Comparison) -> StudyTable:
         histories = [one.place, one.measured, one.run]
         for heights in (one.measured_height, one.run_height):
             histories.append(np.full(one.place.size, np.nan) if heights is None else heights)
-        rows += [
-            dict(zip(names, [one.pantograph, *map(_known, row)], strict=True))
-            for row in np.stack(histories, axis=1).tolist()
-        ]
-    return StudyTable([Column(name) for name in names], rows)
-
-
-def _known(value: float) -> float | None:
-    return None if value != value else value
+        rows += [[one.pantograph, *plain(row)] for row in np.stack(histories, axis=1).tolist()]
+    return file_table(names, rows)
 
 
 def uplifts_table(found: Comparison) -> StudyTable:

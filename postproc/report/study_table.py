@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from catenary.postproc.evaluate.wording import without_sign_of_zero
 from catenary.postproc.files.csv_text import csv_text, number_text
 
 Row = Mapping[str, Any]
@@ -46,8 +47,7 @@ class Column(NamedTuple):
             return str(cell(value))
         # A count has no decimals among figures that have some.
         form = re.sub(r"\.\d+f$", "d", self.format) if isinstance(value, int) else self.format
-        text = format(value, form)
-        return text.removeprefix("-") if not text.strip("-0.") else text
+        return without_sign_of_zero(format(value, form))
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,12 @@ class StudyTable:
         ]
         escaped = ([text.replace("|", "\\|") for text in line] for line in lines)
         return "\n".join(f"| {' | '.join(line)} |" for line in escaped)
+
+
+def file_table(heads: Sequence[str], cells: Iterable[Sequence[Any]]) -> StudyTable:
+    """A table for files, with names of columns and the cells of each row."""
+    rows = [dict(zip(heads, row, strict=True)) for row in cells]
+    return StudyTable([Column(name) for name in heads], rows)
 
 
 def texts_table(

@@ -94,7 +94,7 @@ def summarise(
 def short_summary(
     results: Results, statistics: RunStatistics, criteria: list[Criterion]
 ) -> dict[str, Any]:
-    """As much of ``summarise`` as tables of studies read, without tables of all supports; its
+    """The part of ``summarise`` that tables of studies read, without tables of all supports; its
     parameters are those of that. Not collective."""
     return dict(plain(_short(results, statistics, criteria, indicate(results))))
 

@@ -9,7 +9,7 @@ _on_command_line = False
 
 
 def option(flag: str, argument: str) -> str:
-    """What gives an option, in a sentence for whoever runs this process. Not collective.
+    """Name of an option as the user of this process writes it, for sentences. Not collective.
 
     Parameters
     ----------

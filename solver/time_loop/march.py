@@ -354,14 +354,17 @@ class March:
         """
         dt = self._problem.numerics.dt
         if self._ahead:
-            raise InputError("incidents change the line, and a prepared line stays as it is")
+            raise InputError(
+                "incidents change the line, and a prepared line stays as it is: take them away "
+                "(incidents=)"
+            )
         if compiled_steps(self._scheme, self._showing, dt, shows=False) is None:
             why = (
                 "numerics.scheme is not one_solve"
                 if self.slow_path is None
                 else self.slow_path.reason
             )
-            raise InputError(f"its steps are not those of the compiled loop: {why}")
+            raise InputError(f"a prepared line takes all steps in the compiled loop, but {why}")
         assert isinstance(self._scheme, OneSolve)
         return self._scheme, self._showing, dt
 

@@ -60,12 +60,12 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
     line, pantographs = scheme.interaction.line, scheme.pantographs
     if line.loads is not None and line.loads.are_sampled:
         raise InputError(
-            "gusts are made under way, and a prepared line has none; take them away (wind.gusts=)"
+            "gusts are made under way, and a prepared line has none: take them away (wind.gusts=)"
         )
     if line.window is not None and not line.window.has_rows(0, line.window.arrays.low.size):
         raise InputError(
-            "a window of this line has matrices of what moves only: a prepared line has all of "
-            'them; take window.mode = "off"'
+            "a window has the matrices of its own part of the line, and a prepared line has all: "
+            'take window.mode = "off"'
         )
     make_room(scheme)
     first, last = steps
@@ -106,7 +106,10 @@ def stepped_by_kernels(model: Pantograph) -> SteppedHead:
     """
     moved = model.model if isinstance(model, LoweredPantograph) else model
     if not isinstance(moved, SteppedHead):
-        raise InputError("a pantograph has all its bodies in the time loop, which Python steps")
+        raise InputError(
+            "a pantograph has all its bodies in the time loop, which Python steps: take "
+            'pantographs.*.motion = "reduced"'
+        )
     if moved.by_hand:
         raise InputError("a pantograph has a controller in Python")
     return moved

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from rank_histories import on_one, watched
+from rank_histories import check_ranks
 from scenes import load_scene, mesh_of, problem_of
 
 from catenary.base.parallel import on_root
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 
 WORLD = MPI.COMM_WORLD
-# See test_same_answers.py.
-TOLERANCE = 1e-9
-KEPT = 150
 # The train passes the middle of the line, where two ranks meet; a slack dropper breaks there, too.
 SCENE = (
     "line.n_spans=7",
@@ -45,15 +42,4 @@ def test_defects_on_all_ranks_and_after_a_restart() -> None:
     mesh = on_root(WORLD, lambda: mesh_of(load_scene("en50318_2002", list(SCENE))))
     rest = line_at_rest_on_all(problem, mesh, WORLD)
     assert np.count_nonzero(rest.model.dropper_gap) >= 2
-    found = on_one(lambda comm: watched(comm, rest)), watched(WORLD, rest, kept=KEPT)
-    assert found[1].checkpoint is not None
-    again = watched(WORLD, rest, since=found[1].checkpoint)
-    alone, shared = (np.array(watching.rows) for watching in found)
-    assert WORLD.rank > 0 or np.ptp(shared[:, 0]) > 50.0
-    # Contact forces are rank 0's, energies the line's.
-    own = slice(0 if WORLD.rank == 0 else 1, None)
-    scale = np.abs(alone).max(axis=0)
-    worst = (np.abs(alone - shared).max(axis=0) / scale)[own].max()
-    print(f"rank {WORLD.rank} of {WORLD.size}: {worst:.2e} of the largest")
-    assert worst < TOLERANCE
-    assert np.array_equal(np.array(again.rows)[:, own], shared[KEPT:, own])
+    check_ranks(rest)

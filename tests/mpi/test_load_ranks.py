@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from measuring import registered
 from mpi4py import MPI
-from rank_histories import on_one, watched
+from rank_histories import check_ranks
 from scenes import load_scene, mesh_of, problem_of
 
 from catenary.base.parallel import on_root
@@ -22,9 +22,6 @@ from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.wind.drag import along
 
 WORLD = MPI.COMM_WORLD
-# See test_same_answers.py.
-TOLERANCE = 1e-9
-KEPT = 150
 SCENE = (
     "line.n_spans=7",
     "train.start_m=120",
@@ -65,14 +62,4 @@ def test_loads_in_time_on_all_ranks() -> None:
     problem = problem.__class__(**{**problem.__dict__, **changed})
     with registered(Effect("loads", "loads", "loads", "test", False, build=blow)):
         rest = line_at_rest_on_all(problem, mesh, WORLD)
-        found = on_one(lambda comm: watched(comm, rest)), watched(WORLD, rest, kept=KEPT)
-        assert found[1].checkpoint is not None
-        again = watched(WORLD, rest, since=found[1].checkpoint)
-    alone, shared = (np.array(watching.rows) for watching in found)
-    assert alone.shape == shared.shape
-    assert WORLD.rank > 0 or np.ptp(shared[:, 0]) > 50.0
-    # Contact forces are rank 0's, energies the line's.
-    own = slice(0 if WORLD.rank == 0 else 1, None)
-    scale = np.abs(alone).max(axis=0)
-    assert (np.abs(alone - shared).max(axis=0) < TOLERANCE * scale)[own].all()
-    assert np.array_equal(np.array(again.rows)[:, own], shared[KEPT:, own])
+        check_ranks(rest)

@@ -416,7 +416,7 @@ FAULTS = (
         "what decides a result numerically (1e8 N/m contact, 1e9 N/m droppers)",
         "stood in report.html alone",
         "remarks in summary.json, terminal, sweep.csv, compare",
-        "regression/test_told_remarks.py",
+        "regression/test_reported_remarks.py",
         "test_remarks_are_told_wherever_results_are",
     ),
     Fault(

@@ -52,13 +52,14 @@ def line_of(model: Model, ahead: bool = True) -> LineIntegrator:
 
 
 def heights(
-    model: Model, n_steps: int, first: float, last: float, ahead: bool = True
+    model: Model, n_steps: int, first: float, last: float, ahead: bool = True, name: str = "w"
 ) -> np.ndarray:
-    """Uplift of the contact wire from ``first`` to ``last`` [m] after each step, (n_steps, n)."""
+    """Uplift of the contact wire from ``first`` to ``last`` [m] after each step, (n_steps, n), or
+    another unknown of that ``name``."""
     line, dt = line_of(model, ahead), model.problem.numerics.dt
     x = model.contact_x
     nodes = model.contact_nodes[(x >= first - 1e-6) & (x <= last + 1e-6)]
-    unknowns, rows = model.dofs(nodes), []
+    unknowns, rows = model.dofs(nodes, name), []
     try:
         for step in range(1, n_steps + 1):
             line.load_at(step * dt)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -158,6 +158,24 @@ class History(Observer):
         return np.array(self._rows[channel])
 
 
+def energies_of_free_motion(
+    model: Model, lifted: np.ndarray, struck: np.ndarray, n_steps: int, every: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Energy of an undamped line every so many steps of 1 ms, kinetic and in all (n,) [J].
+
+    It is released from a displacement ``lifted`` [m] with velocities ``struck`` [m/s].
+    """
+    found = []
+    with line_alone(model, replace(model.problem.numerics, dt=1e-3)) as stepper:
+        release(stepper, lifted, struck, model)
+        for number in range(n_steps + 1):
+            if number % every == 0:
+                found.append(stepper.energies())
+            step(stepper)
+    kinetic, elastic = np.array(found).T
+    return kinetic, kinetic + elastic
+
+
 def start_march(
     problem: Problem,
     mesh: LineMesh,
@@ -173,16 +191,68 @@ def march(
     mesh: LineMesh,
     watch: Callable[[StepView], Any] | None = None,
     change_form: Callable[[Equilibrium], Equilibrium] = lambda f: f,
+    since: Mapping[str, Any] | None = None,
 ) -> History:
-    """March to the end and return what was seen; what ``watch`` returns of each step is kept."""
+    """March to the end, from a state or the start, and return what was seen; what ``watch`` returns
+    of each step is kept."""
     run, _ = start_march(problem, mesh, change_form)
     history = History(watch)
     try:
+        if since is not None:
+            run.restore({name: np.array(value) for name, value in since.items()})
         history.outcome = run.run([history])
     finally:
         run.destroy()
     assert history.outcome.outcome == "done", history.outcome.outcome
     return history
+
+
+def continued(problem: Problem, mesh: LineMesh, at: int) -> tuple[History, History]:
+    """A march, which keeps its state of step ``at``, and one that goes on from that state.
+
+    Fails unless steps, times and number of states of the second are those of the first from there.
+    """
+    whole = march(problem, mesh, lambda view: view.checkpoint() if view.step == at else None)
+    rest = march(problem, mesh, since=whole.watched[at])
+    assert len(rest.time) == len(whole.time) - at > 1
+    check("times [s]", rest.time, whole.time[at:], within=1e-15)
+    return whole, rest
+
+
+def check_continued(whole: History, rest: History, at: int, *channels: str) -> None:
+    """Compare channels of marches of ``continued``: the same operations on the same numbers, each
+    relative to its largest."""
+    for channel in channels:
+        expected = whole[channel][at:]
+        check(channel, rest[channel], expected, within=1e-12 * np.abs(expected).max())
+
+
+def order_of_march(
+    problem: Problem, mesh: LineMesh, n_steps: int, since: float = 0.0
+) -> tuple[float, float]:
+    """Observed order in the step of the contact force, and the one expected of a method of order 2.
+
+    Steps halve from 1 ms on, ``n_steps`` of them down to 1/8 ms; the force is
+    compared every 4 ms from the time ``since`` [s] on with that of steps of 1/32 ms.
+    """
+
+    def force(dt: float) -> np.ndarray:
+        own = replace(problem, numerics=replace(problem.numerics, dt=dt))
+        found = march(own, mesh)["contact_force"][:, 0]
+        return found[:: round(4e-3 / dt)][round(since / 4e-3) :]
+
+    steps = [1e-3 / 2**k for k in range(4 - n_steps, 4)]
+    reference = force(1e-3 / 32)
+    errors = [float(np.sqrt(((force(dt) - reference) ** 2).mean())) for dt in steps]
+    observed = print_table(
+        "rms error of the contact force [N], expected order 2",
+        [f"{1e3 * dt:g} ms" for dt in steps],
+        errors,
+    )
+    # The reference has an error of its own, (1/4)^2 of that of the finest step, which all errors
+    # lack.
+    expected = orders([1 / 4**2 - 1 / 32**2, 1 / 8**2 - 1 / 32**2])[0]
+    return float(observed[-1]), float(expected)
 
 
 @contextmanager

@@ -104,6 +104,27 @@ def watched(
     return watching
 
 
+def check_ranks(rest: LineAtRest, kept: int = 150, within: float = 1e-9) -> None:
+    """March on one rank and on all, and on all again from the state of step ``kept``. Collective.
+
+    Fails unless forces and energies of both differ by at most ``within`` of the largest, and a run
+    that is continued repeats the other to the last bit. `test_same_answers` has the tolerance.
+    """
+    world = MPI.COMM_WORLD
+    found = on_one(lambda comm: watched(comm, rest)), watched(world, rest, kept=kept)
+    assert found[1].checkpoint is not None
+    again = watched(world, rest, since=found[1].checkpoint)
+    alone, shared = (np.array(watching.rows) for watching in found)
+    assert alone.shape == shared.shape
+    assert world.rank > 0 or np.ptp(shared[:, 0]) > 50.0
+    # Contact forces are rank 0's, energies the line's.
+    own = slice(0 if world.rank == 0 else 1, None)
+    worst = (np.abs(alone - shared).max(axis=0) / np.abs(alone).max(axis=0))[own].max()
+    print(f"rank {world.rank} of {world.size}: {worst:.2e} of the largest, expected below {within}")
+    assert worst < within
+    assert np.array_equal(np.array(again.rows)[:, own], shared[kept:, own])
+
+
 def relative(values: np.ndarray, reference: np.ndarray) -> float:
     """Largest difference over the largest reference; 0 for histories of nothing."""
     if reference.size == 0:

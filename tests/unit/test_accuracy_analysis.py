@@ -172,9 +172,11 @@ def test_an_uncertain_reference_recommends_nothing() -> None:
     assert advice(rows, HISTORY, 1.0, 0.33).startswith("For 1 % in the force history")
     for own, said in ((0.34, "may be wrong by 0.34 % itself"), (math.inf, "is not known")):
         sentence = advice(rows, HISTORY, 1.0, own)
-        assert sentence.startswith("What 1 % in the force history (rms, 0-20 Hz) takes cannot be")
+        assert sentence.startswith(
+            "Settings for 1 % in the force history (rms, 0-20 Hz) are not known"
+        )
         assert said in sentence and "dt =" not in sentence
-    assert "cannot be told" in advice(rows, HISTORY, 1.0, math.nan)
+    assert "are not known" in advice(rows, HISTORY, 1.0, math.nan)
 
 
 def test_what_is_refined_alone_is_recommended_alone() -> None:

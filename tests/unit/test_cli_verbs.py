@@ -63,7 +63,7 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
         told.calls.append((scene, out, options))
         if told.error is not None:
             raise told.error
-        options["tell"](told.result.outcome)
+        options["on_closed"](told.result.outcome)
         return told.result
 
     module = types.ModuleType("catenary.cases.run.runner")

@@ -152,7 +152,7 @@ def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
         (["--topology", "simpel"], "there is no kind of line named simpel: name one of simple,"),
         (["--droppers", "hung.csv"], "--droppers needs --spans too"),
         (["--spans", "none.csv"], "none.csv cannot be read: no such file"),
-        (["--spans", "few.csv", "--droppers", "hung.csv"], "a new case needs 12 spans"),
+        (["--spans", "few.csv", "--droppers", "hung.csv"], "a new case needs 12, to run in"),
         (["--spans", "line 7.csv"], "spacing_m, or a planner's table by --droppers"),
         (["--spans", "hung.csv"], "the table of spans is"),
         (["--spans", "line 7.csv", "--droppers", "typed.csv"], "droppers is typed.csv; its line 5"),

@@ -507,8 +507,8 @@ def test_python_gives_the_same(files: Path) -> None:
         ),
         (TASK.replace(FORCE, "line.n_spans").replace("117.0", "6.0"), "is a whole number"),
         (TASK.replace(FORCE, "train.speed_km_h").replace("117.0", "250.0"), "moves the pantograph"),
-        (TASK.replace("[measured]", "[measured]\npantograph = 2"), "train of the scene has 1"),
-        (TASK + f'\n[[parameters]]\nkey = "{FORCE}"\ndeviation = 1.0', "is looked for twice"),
+        (TASK.replace("[measured]", "[measured]\npantograph = 2"), "it must be from 1 to 1"),
+        (TASK + f'\n[[parameters]]\nkey = "{FORCE}"\ndeviation = 1.0', "twice; name it once"),
         (TASK + "\n[droppers]\nspans = [9]\ndeviation_mm = 2.0", "names span 9: the line has 6"),
         (TASK.replace("117.0", "-1e7"), "comes to a value that the scene refuses"),
         (
@@ -519,7 +519,10 @@ def test_python_gives_the_same(files: Path) -> None:
             TASK.replace('unit = "mm", noise', 'unit = "cm", noise'),
             "check column, unit and zero of measured.head_height",
         ),
-        (TASK.replace(FORCE, "pantographs.reference.masses_kg"), "its prior has no mean"),
+        (
+            TASK.replace(FORCE, "pantographs.reference.masses_kg"),
+            "parameters.0.mean must be left out",
+        ),
     ],
 )
 def test_a_task_that_does_not_fit_is_told(

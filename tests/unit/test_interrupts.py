@@ -98,7 +98,9 @@ def test_a_signal_during_the_march_ends_it_in_good_order(
     run = runner.March.run
     monkeypatch.setattr(runner.March, "run", signalled(run, number))
     told: list[str] = []
-    ended = runner.run_case(scene, tmp_path, MPI.COMM_SELF, tell=told.append, only_summary=True)
+    ended = runner.run_case(
+        scene, tmp_path, MPI.COMM_SELF, on_closed=told.append, only_summary=True
+    )
     assert ended.outcome == "interrupted" and told == ["interrupted"]
     with Results(tmp_path) as results:
         assert results.outcome == "interrupted"

@@ -20,7 +20,7 @@ def test_keys_reach_the_problem() -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (GIVEN[1:], "must not give smallest_dt_s without adaptive_tolerance_N"),
+        (GIVEN[1:], "must not have smallest_dt_s without adaptive_tolerance_N"),
         ((GIVEN[0], "numerics.smallest_dt_s=6e-4"), "from dt_s / 4096 to dt_s / 2"),
         ((GIVEN[0], "numerics.smallest_dt_s=2e-7"), "from dt_s / 4096 to dt_s / 2"),
         (("numerics.adaptive_tolerance_N=0",), "greater than 0"),

@@ -29,12 +29,18 @@ def test_keys_reach_the_problem() -> None:
     ("words", "says"),
     [
         (("window.mode=short",), "window.mode .* must be off, exact or bounded"),
-        (("window.tolerance=1e-6",), "must not give tolerance, which belongs to mode bounded"),
-        (("window.mode=exact", AHEAD), "must not give spans_ahead, which belongs to mode bounded"),
+        (
+            ("window.tolerance=1e-6",),
+            "must not have tolerance with mode off, but with bounded only",
+        ),
+        (
+            ("window.mode=exact", AHEAD),
+            "must not have spans_ahead with mode exact, but with bounded only",
+        ),
         ((BOUNDED, "window.tolerance=0.1"), "window.tolerance .* must be at most 0.01"),
         ((BOUNDED, "window.spans_ahead=1", BEHIND), "window.spans_ahead .* must be at least 2"),
         ((BOUNDED, "window.spans_behind=0", AHEAD), "window.spans_behind .* must be at least 2"),
-        ((BOUNDED, AHEAD), "must give spans_behind with spans_ahead, or neither"),
+        ((BOUNDED, AHEAD), "needs spans_ahead and spans_behind together, but only has spans_ahead"),
         ((BOUNDED, AHEAD, BEHIND, "window.tolerance=1e-6"), "takes tolerance or spans_ahead"),
         ((BOUNDED, "numerics.scheme=fixed_point"), "window.mode is .*bounded.* it must be off, as"),
         (("window.mode=exact", "numerics.coupling=explicit"), "it must be off, as .* explicit"),

@@ -424,15 +424,15 @@ def test_an_installer_reads_which_criteria_nothing_helps_and_which_nothing_loses
 @pytest.mark.parametrize(
     ("errors", "says"),
     [
-        ([SPEED, {**SPEED, "name": "again"}], "of which there are errors before"),
+        ([SPEED, {**SPEED, "name": "again"}], "as errors.0 are; give one of them"),
         ([SPEED, {**TENSION, "name": "speed"}], "a name of its own"),
         ([{**SPEED, "key": "line.topology"}], "no number"),
         ([{**SPEED, "key": "pantographs.reference.masses_kg"}], "errors.0.entry names one"),
         ([{**SPEED, "level": -1.0}], "^errors.0.level is -1.0 in"),
         ([{**SPEED, "levle": 1.0}], "errors.0.levle in .* did you mean errors.0.level"),
-        ([{**SPEED, "level": 50.0}], "at most 40"),
+        ([{**SPEED, "level": 50.0}], "at most most, 40"),
         ([{**SPEED, "most": 5000.0}], "train.speed_km_h is 5250"),
-        ([{**TENSION, "wires": ["wire"]}], "it has contact_wire, messenger_wire"),
+        ([{**TENSION, "wires": ["wire"]}], "the line has contact_wire, messenger_wire"),
     ],
 )
 def test_errors_that_cannot_be_are_refused(errors: list[dict[str, Any]], says: str) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measuring import History, check, march, start_march
+from measuring import check, march, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import LineMesh
@@ -101,11 +101,7 @@ def test_a_continued_run_is_the_uninterrupted_one(scheme: str, mesh: LineMesh) -
     levels = [int(state["contacts"][0]) for state in checkpoints]
     at = int(np.argmax(levels))
     assert 0 < at < len(levels) - 1 and levels[at] > 0
-    rest, _ = start_march(problem, mesh)
-    again = History()
-    rest.restore({name: np.array(value) for name, value in checkpoints[at].items()})
-    rest.run([again])
-    rest.destroy()
+    again = march(problem, mesh, since=checkpoints[at])
     # The same operations on the same numbers.
     assert np.array_equal(again["contact_force"], whole["contact_force"][at:])
 

@@ -8,18 +8,11 @@ between sqrt(n) eps and, should they all have one sign, n eps.
 from __future__ import annotations
 
 import numpy as np
-from measuring import check, line_alone, march, release, step
+from measuring import check, energies_of_free_motion
 from scipy.sparse import linalg as sparse_linalg
-from small_lines import (
-    HANGING,
-    en50318_line,
-    mesh_of,
-    numerics,
-    problem_of,
-    train,
-)
+from small_lines import HANGING, en50318_line, mesh_of, problem_of
+from swinging_train import swinging_train
 
-from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
@@ -34,16 +27,9 @@ def test_energy_stays_over_a_hundred_thousand_steps() -> None:
     load = np.zeros(model.n_dofs)
     load[model.dofs(model.mesh.droppers[4, 1])] = 200.0
     lifted = sparse_linalg.spsolve(stiffness_matrix(model), load)
-    n_steps, totals, kinetic_share = 100_000, [], []
-    with line_alone(model, numerics(1e-3)) as stepper:
-        release(stepper, lifted, np.zeros_like(lifted), model)
-        for number in range(n_steps + 1):
-            if number % 1000 == 0:
-                kinetic, elastic = stepper.energies()
-                totals.append(kinetic + elastic)
-                kinetic_share.append(kinetic / totals[-1])
-            step(stepper)
-    total = np.array(totals)
+    n_steps = 100_000
+    kinetic, total = energies_of_free_motion(model, lifted, np.zeros_like(lifted), n_steps, 1000)
+    kinetic_share = kinetic / total
     # The work of the force that lifted it; one solve with K, whose condition number is below 1e5.
     check("energy at the start [J]", total[0], 0.5 * lifted @ load, within=1e5 * EPS * total[0])
     drift = np.abs(total / total[0] - 1)
@@ -53,49 +39,11 @@ def test_energy_stays_over_a_hundred_thousand_steps() -> None:
 
 
 def test_energy_of_line_and_pantograph_stays_while_they_are_in_contact() -> None:
-    """A train at rest: all that is linear, contact spring and pantograph included.
-
-    Conserved is the sum of the line's energy, the pantograph's, the contact spring's f^2 / (2 k)
-    and the potential of the constant lift. The line's own weights are in equilibrium.
-    """
-    line = en50318_line(3)
-    lift, dt, duration = 80.0, 1e-3, 4.0
-    data = LumpedData((7.2, 15.0), (4200.0, 50.0), (0.0, 0.0))
-    # Moves by a nanometre: its power is the force times 1e-10 m/s times a slope below 1.
-    creep = 1e-10
-    problem = problem_of(
-        line,
-        HANGING,
-        train=train(
-            creep,
-            80.0,
-            80.0 + creep * duration,
-            data=data,
-            static_force=lift,
-            raise_time=0.0,
-            nominal_height=5.5,
-        ),
-        numerics=numerics(dt),
-    )
-    history = march(
-        problem, mesh_of(line, 3), lambda view: (sum(view.energies()), view.checkpoint())
-    )
-    masses = np.asarray(data.masses)
-    totals = []
-    for (energy, checkpoint), force in zip(
-        history.watched, history["contact_force"][:, 0], strict=True
-    ):
-        position, velocity, _ = np.split(checkpoint["pantograph_0"], 3)
-        # The base spring is relaxed when the spring above it carries the lift at 5.5 m.
-        stretch = position - (5.5 + lift / data.stiffnesses[0])
-        pantograph = 0.5 * masses @ velocity**2
-        pantograph += 0.5 * stretch @ data.chain(data.stiffnesses) @ stretch
-        contact = force**2 / (2 * problem.contact.stiffness)
-        totals.append(energy + pantograph + contact - lift * stretch[-1])
-    total = np.array(totals)
-    exchanged = np.ptp([energy for energy, _ in history.watched])
-    print(f"{total.size} states; the line's own energy varies by {exchanged:.3f} J")
-    assert exchanged > 0.01
+    """All that is linear, contact spring and pantograph included; weights are in equilibrium."""
+    lift = 80.0
+    problem, _, own, total = swinging_train(80.0, lift, 4.0, 1e-3)
+    print(f"{total.size} states; the line's own energy varies by {np.ptp(own):.3f} J")
+    assert np.ptp(own) > 0.01
     # Round-off: forces come from differences of heights of 5 m on springs of 5e4 N/m, and the
     # potential is a product of the lift with such a height.
     within = total.size * EPS * (problem.contact.stiffness * 5.5 * 1e-3 + lift * 5.5)

@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from measuring import COMM, History, check, free_matrices, march, orders, print_table, start_march
+from measuring import (
+    COMM,
+    check,
+    check_continued,
+    continued,
+    free_matrices,
+    march,
+    order_of_march,
+)
 from scipy import linalg
 from small_lines import (
     FREE_MASS,
@@ -237,26 +245,11 @@ def test_the_march_stays_of_order_2(incident: LineIncident, method: dict[str, An
         incidents=(incident,),
     )
 
-    def force(dt: float) -> np.ndarray:
-        """Contact force every 4 ms after the incident."""
-        own = numerics(dt, **method)
-        found = march(replace(problem, numerics=own), mesh)["contact_force"][:, 0]
-        return found[:: round(4e-3 / dt)][round(incident.time / 4e-3) :]
-
-    steps = [1e-3 / 2**k for k in range(1, 4)]
-    reference = force(1e-3 / 32)
-    errors = [float(np.sqrt(((force(dt) - reference) ** 2).mean())) for dt in steps]
-    observed = print_table(
-        "rms error of the contact force [N], expected order 2",
-        [f"{1e3 * dt:g} ms" for dt in steps],
-        errors,
-    )
-    # The reference has an error of its own, (1/4)^2 of that of the finest step, which all errors
-    # lack.
-    expected = orders([1 / 4**2 - 1 / 32**2, 1 / 8**2 - 1 / 32**2])[0]
+    problem = replace(problem, numerics=numerics(1e-3, **method))
+    observed, expected = order_of_march(problem, mesh, 3, incident.time)
     # Order 1 is one away; passing from element to element costs up to 0.2, see
     # test_order_in_time.py.
-    check("order of the march", observed[-1], expected, within=0.25)
+    check("order of the march", observed, expected, within=0.25)
 
 
 @pytest.mark.parametrize(
@@ -291,28 +284,10 @@ def test_a_continued_run_is_the_uninterrupted_one(own: dict[str, Any], at: int) 
         numerics=numerics(1e-3, **own),
         incidents=(DropperBreak(0.2, 126.5 - 6.5), TensionLoss(0.3, MESSENGER_WIRE, 0.8)),
     )
-    kept: dict[int, Any] = {}
-
-    def keep(view: Any) -> None:
-        if view.step == at:
-            kept[at] = view.checkpoint()
-
-    whole, rest = History(keep), History()
-    run, _ = start_march(problem, mesh)
-    run.run([whole])
-    run.destroy()
-    again, _ = start_march(problem, mesh)
-    again.restore({name: np.array(value) for name, value in kept[at].items()})
-    outcome = again.run([rest])
-    again.destroy()
-    assert outcome.outcome == "done"
+    whole, rest = continued(problem, mesh, at)
     assert len(whole.time) == 401
-    check("times [s]", whole.time, 1e-3 * np.arange(401), within=1e-15)
-    check("times [s]", rest.time, whole.time[at:], within=1e-15)
-    for channel in ("contact_force", "head_height", "wire_height", "dropper_force", "arm_uplift"):
-        expected = whole[channel][at:]
-        # The same operations on the same numbers; relative to the largest of each.
-        check(channel, rest[channel], expected, within=1e-12 * np.abs(expected).max())
+    channels = ("contact_force", "head_height", "wire_height", "dropper_force", "arm_uplift")
+    check_continued(whole, rest, at, *channels)
 
 
 HERTZ = HertzLaw(9e5, 1.5, 0.5, 0.1)

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from going_on import EN, heights, line_of
-from measuring import COMM, check
+from going_on import EN, heights
+from measuring import check
 from small_lines import HANGING, ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary import InputError
@@ -76,17 +76,7 @@ def struck(
 
 def sideways(model: Model, first: float, last: float) -> np.ndarray:
     """Lateral displacement of the contact wire from ``first`` to ``last`` [m] at the end."""
-    line = line_of(model)
-    try:
-        for step in range(1, STEPS + 1):
-            line.load_at(step * DT)
-            line.free_step()
-        whole = np.concatenate(COMM.allgather(line.displacement))
-    finally:
-        line.destroy()
-    x = model.contact_x
-    nodes = model.contact_nodes[(x >= first - 1e-6) & (x <= last + 1e-6)]
-    return np.asarray(whole[model.dofs(nodes, "v")])
+    return heights(model, STEPS, first, last, name="v")[-1]
 
 
 @pytest.mark.parametrize(

@@ -6,16 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 from measuring import (
-    History,
     check,
+    check_continued,
+    continued,
+    energies_of_free_motion,
     free_matrices,
-    line_alone,
     march,
     matrix_of,
-    release,
     solve_free,
-    start_march,
-    step,
 )
 from scipy.sparse import linalg as sparse_linalg
 from small_lines import (
@@ -24,7 +22,6 @@ from small_lines import (
     ac_simple_line,
     bare_wires,
     mesh_of,
-    numerics,
     problem_of,
     train,
 )
@@ -102,14 +99,9 @@ def test_energy_of_leaning_droppers_and_inclined_arms_stays() -> None:
     lifted = solve_free(matrix_of(model, stiffness=1.0), model, load)
     nodes = np.arange(model.mesh.n_nodes)
     assert np.abs(lifted[model.dofs(nodes, "v")]).max() > 1e-3
-    totals, n_steps = [], 4000
-    with line_alone(model, numerics(1e-3)) as stepper:
-        release(stepper, lifted, np.zeros_like(lifted), model)
-        for number in range(n_steps + 1):
-            if number % 500 == 0:
-                totals.append(sum(stepper.energies()))
-            step(stepper)
-    drift = np.abs(np.array(totals) / totals[0] - 1).max()
+    n_steps = 4000
+    _, total = energies_of_free_motion(model, lifted, np.zeros_like(lifted), n_steps, 500)
+    drift = np.abs(total / total[0] - 1).max()
     # Bars of 1e7 N/m beside wires: the condition of a step is a hundred times that of a flat line.
     check("relative change of the energy", drift, 0.0, within=100 * n_steps * EPS)
 
@@ -117,23 +109,8 @@ def test_energy_of_leaning_droppers_and_inclined_arms_stays() -> None:
 def test_a_continued_lateral_run_is_the_uninterrupted_one() -> None:
     line = ac_simple_line(4)
     problem = problem_of(line, WHOLE | LATERAL, train=train(70.0, 60.0, 80.0, raise_time=0.1))
-    mesh, at = mesh_of(line, 3), 150
-    kept = {}
-
-    def keep(view: object) -> None:
-        if view.step == at:
-            kept.update(view.checkpoint())
-
-    whole, rest = History(keep), History()
-    for history in (whole, rest):
-        run, _ = start_march(problem, mesh)
-        if history is rest:
-            run.restore({name: np.array(value) for name, value in kept.items()})
-        run.run([history])
-        run.destroy()
-    for name in ("contact_force", "dropper_force", "arm_uplift"):
-        expected = whole[name][at:]
-        check(name, rest[name], expected, within=1e-12 * np.abs(expected).max())
+    whole, rest = continued(problem, mesh_of(line, 3), 150)
+    check_continued(whole, rest, 150, "contact_force", "dropper_force", "arm_uplift")
 
 
 def test_a_push_upwards_at_an_inclined_arm_moves_the_wire_along_its_bar() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import paper_pantograph as paper
-from measuring import History, check, start_march
+from measuring import History, check, check_continued, continued, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.cases.scene.input.toml_input import read_toml
@@ -94,22 +94,6 @@ def test_continued_run_of_the_paper_s_pantograph_is_the_uninterrupted_one() -> N
     trailing = train(70.0, 110.0, 150.0, behind=(40.0,)).placements
     both = replace(leading, placements=leading.placements + trailing)
     problem = problem_of(line, WHOLE, train=both)
-    kept = {}
-
-    def keep(view: object) -> None:
-        if view.step == at:
-            kept.update({name: np.array(value) for name, value in view.checkpoint().items()})
-
-    whole, rest = History(keep), History()
-    march, _ = start_march(problem, mesh)
-    march.run([whole])
-    march.destroy()
-    march, _ = start_march(problem, mesh)
-    march.restore(kept)
-    march.run([rest])
-    march.destroy()
-    assert len(rest.time) == len(whole.time) - at > 100
-    for channel in ("contact_force", "head_height"):
-        expected = whole[channel][at:]
-        assert expected.shape[1] == 2
-        check(channel, rest[channel], expected, within=1e-12 * np.abs(expected).max())
+    whole, rest = continued(problem, mesh, at)
+    assert len(rest.time) > 100 and rest["contact_force"].shape[1] == 2
+    check_continued(whole, rest, at, "contact_force", "head_height")

@@ -20,6 +20,7 @@ from measuring import (
     line_alone,
     march,
     matrix_of,
+    order_of_march,
     orders,
     print_table,
     release,
@@ -151,32 +152,17 @@ def test_the_march_with_a_pantograph_is_of_order_2(changes: dict[str, Any]) -> N
     )
     problem = replace(problem, contact=replace(problem.contact, damping=50.0))
 
-    def force(dt: float) -> np.ndarray:
-        """Contact force every 4 ms."""
-        found = march(replace(problem, numerics=numerics(dt, **changes)), mesh)["contact_force"][
-            :, 0
-        ]
-        return found[:: round(4e-3 / dt)]
-
-    steps = [1e-3 / 2**k for k in range(4)]
-    reference = force(1e-3 / 32)
-    errors = [float(np.sqrt(((force(dt) - reference) ** 2).mean())) for dt in steps]
-    observed = print_table(
-        "rms error of the contact force [N], expected order 2",
-        [f"{1e3 * dt:g} ms" for dt in steps],
-        errors,
-    )
-    # The reference has an error of its own, (1/4)^2 of that of the finest step, which all errors
-    # lack.
-    expected = orders([1 / 4**2 - 1 / 32**2, 1 / 8**2 - 1 / 32**2])[0]
+    problem = replace(problem, numerics=numerics(1e-3, **changes))
+    observed, expected = order_of_march(problem, mesh, 4)
     # The next terms: (omega dt)^2 of the fastest motion, the head against half an element of wire
     # on the contact spring; and the share V dt / h of the steps that pass from one element to the
     # next, where the second derivative of the contact's place in the equations jumps.
     h = float(np.diff(mesh.x(mesh.wires[CONTACT_WIRE])).min())
     masses = (EN_PANTOGRAPH.masses[0], line.contact_wire.mass_per_length * h / 2)
     omega = np.sqrt(problem.contact.stiffness * sum(1 / mass for mass in masses))
-    following = (omega * steps[-2]) ** 2 + speed * steps[-2] / h
-    check("order of the march", observed[-1], expected, within=np.log2(1 + following))
+    coarser = 1e-3 / 4  # of the two steps of the last order
+    following = (omega * coarser) ** 2 + speed * coarser / h
+    check("order of the march", observed, expected, within=np.log2(1 + following))
 
 
 @pytest.mark.study

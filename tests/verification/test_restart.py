@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measuring import History, check, start_march
+from measuring import check, check_continued, continued, march
 from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.mbs.control import Regulation
 from catenary.mbs.head.laws import Law
 from catenary.solver.problem.contact_laws import LinearLaw
+from catenary.solver.problem.problem import steps_of
 
 
 @pytest.mark.parametrize(
@@ -28,37 +29,10 @@ def test_continued_run_equals_the_uninterrupted_one(scheme: str, integrator: str
         train=train(70.0, 120.0, 180.0, behind=(0.0, 31.0), raise_time=0.3),
         numerics=numerics(1e-3, scheme, integrator=integrator, spectral_radius=0.6),
     )
-    at = 400
-    checkpoints = {}
-
-    def keep(view: object) -> None:
-        if view.step == at:
-            checkpoints[at] = view.checkpoint()
-
-    whole, rest = History(keep), History()
-    run, _ = start_march(problem, mesh)
-    run.run([whole])
-    run.destroy()
-    again, _ = start_march(problem, mesh)
-    again.restore({name: np.array(value) for name, value in checkpoints[at].items()})
-    rest.outcome = again.run([rest])
-    again.destroy()
-    assert rest.outcome.outcome == "done"
-    assert len(rest.time) == len(whole.time) - at
-    assert rest.stage.start_time == pytest.approx(at * problem.numerics.dt, rel=1e-15)
-    check("times [s]", rest.time, whole.time[at:], within=1e-15)
-    # The same operations on the same numbers; relative to the largest of each.
-    for channel in (
-        "contact_position",
-        "contact_force",
-        "head_height",
-        "wire_height",
-        "dropper_force",
-        "arm_uplift",
-    ):
-        expected = whole[channel][at:]
-        within = 1e-12 * np.abs(expected).max()
-        check(channel, rest[channel], expected, within=within)
+    whole, rest = continued(problem, mesh, 400)
+    assert rest.stage.start_time == pytest.approx(400 * problem.numerics.dt, rel=1e-15)
+    channels = ("contact_force", "head_height", "wire_height", "dropper_force", "arm_uplift")
+    check_continued(whole, rest, 400, "contact_position", *channels)
 
 
 def test_laws_and_regulators_go_on_where_they_were() -> None:
@@ -74,30 +48,15 @@ def test_laws_and_regulators_go_on_where_they_were() -> None:
     names = WHOLE | {"contact_damping", "pantograph_laws", "regulated_lift"}
     contact, steps = LinearLaw(5e4, 50.0), numerics(1e-3, "one_solve")
     problem = problem_of(line, names, contact=contact, train=ours, numerics=steps)
-    mesh, checkpoints = mesh_of(line, 3), {}
-
-    def keep(view: object) -> None:
-        if view.step == 203:
-            checkpoints["at"] = view.checkpoint()
-
-    whole, rest = History(keep), History()
-    run, _ = start_march(problem, mesh)
-    run.run([whole])
-    run.destroy()
-    again, _ = start_march(problem, mesh)
-    again.restore({name: np.array(value) for name, value in checkpoints["at"].items()})
-    again.run([rest])
-    again.destroy()
-    plain = np.array(whole["contact_force"][203:])
+    mesh, at = mesh_of(line, 3), 203
+    whole, rest = continued(problem, mesh, at)
+    plain = np.array(whole["contact_force"][at:])
     check("contact force [N]", rest["contact_force"], plain, within=1e-9)
-    forgetful, changed = {**checkpoints["at"]}, History()
+    forgetful = dict(whole.watched[at])
     (name,) = (key for key in forgetful if key.startswith("pantograph_"))
     forgetful[name] = np.array(forgetful[name])
     forgetful[name][-7:] = 0.0  # without what the controller remembers the run is another one
-    again, _ = start_march(problem, mesh)
-    again.restore({name: np.array(value) for name, value in forgetful.items()})
-    again.run([changed])
-    again.destroy()
+    changed = march(problem, mesh, since=forgetful)
     assert np.abs(np.array(changed["contact_force"]) - plain).max() > 0.1
 
 
@@ -106,13 +65,7 @@ def test_step_numbers_go_on() -> None:
     line = en50318_line(3)
     mesh = mesh_of(line, 2)
     problem = problem_of(line, train=train(70.0, 70.0, 71.0))
-    first, second = History(lambda view: view.checkpoint()), History(lambda view: view.step)
-    run, _ = start_march(problem, mesh)
-    run.run([first])
-    run.destroy()
+    first = march(problem, mesh, lambda view: view.checkpoint())
     longer = replace(problem, train=replace(problem.train, end=72.0))
-    again, _ = start_march(longer, mesh)
-    again.restore(first.watched[-1])
-    again.run([second])
-    again.destroy()
-    assert second.watched == list(range(len(first.time) - 1, again.n_steps + 1))
+    second = march(longer, mesh, lambda view: view.step, since=first.watched[-1])
+    assert second.watched == list(range(len(first.time) - 1, steps_of(longer) + 1))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from dense_line import DenseLine
 from equations import press
-from measuring import COMM, History, check, march, matrix_of, start_march
+from measuring import COMM, History, check, continued, march, matrix_of
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 from studies import few_values
 from ts_alpha2 import TS_ALPHA2
@@ -217,14 +217,9 @@ def test_a_slack_dropper_that_breaks_takes_its_damper_along(scheme: str) -> None
 def test_a_continued_run_is_the_uninterrupted_one(way: str) -> None:
     mesh, at = mesh_of(LINE, 2), 222
     problem = on_its_way(numerics=numerics(1e-3, **WAYS[way]))
-    whole = march(problem, mesh, lambda view: view.checkpoint() if view.step == at else None)
-    run, _ = start_march(problem, mesh)
-    history = History()
-    with run:
-        run.restore(whole.watched[at])
-        run.run([history])
+    whole, rest = continued(problem, mesh, at)
     for name in ("contact_force", "dropper_force"):
-        assert np.array_equal(history[name], whole[name][at:]), name
+        assert np.array_equal(rest[name], whole[name][at:]), name
 
 
 @pytest.mark.study

@@ -15,8 +15,8 @@ from catenary.cases.cli.app import (
     Jobs,
     Out,
     SceneWords,
+    print_findings,
     serial_verb,
-    tell,
 )
 from catenary.cases.terminal import console
 
@@ -55,7 +55,7 @@ class TaskWords:
             warn=console.warn,
             say=console.say,
         )
-        tell(str(made), made.files)
+        print_findings(str(made), made.files)
         return console.DONE
 
 

@@ -15,9 +15,9 @@ from catenary.cases.cli.app import (
     RunWords,
     StudyRuns,
     folder_option,
+    print_findings,
     records_of,
     serial_verb,
-    tell,
     verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
@@ -115,7 +115,7 @@ def speed(
     speeds, command = Speeds(slowest, fastest, step, within), f"catenary speed {words.case}"
     marching, scene = _begun(words, "speed.csv", out, speeds.first, runs)
     found = find_speeds(marching, scene, speeds, criterion or [], direction, command)
-    tell(str(found), found.files)
+    print_findings(str(found), found.files)
     return console.DONE
 
 
@@ -150,7 +150,7 @@ def separation(
     distances, command = Distances(nearest, farthest, step), f"catenary separation {words.case}"
     marching, scene = _begun(words, "separation.csv", out, distances.values, runs)
     found = find_separations(marching, scene, distances, command)
-    tell(str(found), found.files)
+    print_findings(str(found), found.files)
     return console.DONE
 
 
@@ -198,7 +198,7 @@ def what_if(
         files = []
         if out is not None:
             files = on_root(comm, lambda: question.write(folder, found), takes_long=True)
-    tell(question.as_text(found), files)
+    print_findings(question.as_text(found), files)
     return console.DONE
 
 

@@ -18,8 +18,8 @@ from catenary.cases.cli.app import (
     StudyRuns,
     Vary,
     folder_option,
+    print_findings,
     serial_verb,
-    tell,
     verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
@@ -137,7 +137,7 @@ def sweep(
         return verdict(made.run_part(own, comm, options), "sweep")
     command = f"catenary sweep {words.case}"
     found = made.run(comm, options, command, _names(plotted), histogram)
-    tell(str(found), found.files)
+    print_findings(str(found), found.files)
     return verdict(found.ended, "sweep")
 
 

@@ -137,7 +137,7 @@ def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]
     if overlaps is not None:
         both = [range(first, first + overlaps.n_spans) for first in overlaps.first]
         if any(ahead.stop >= n for ahead in both):
-            raise InputError("the overlap is beyond the line")
+            raise InputError("line.overlap.first_span is beyond the line")
         kinds = Counter(tuple(lengths[i] for i in spans) for spans in both)
         inner -= Counter(length for kind, often in kinds.items() for length in kind * often)
     kept: list[float] = []

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from catenary.cases.scene.keys.table import Table
-from catenary.cases.scene.keys.units import SUFFIXES
+from catenary.cases.scene.keys.units import without_unit
 from catenary.solver.effects import all_effects as effects
 
 # Stands for an index into a list of tables or for a name that the scene chooses.
@@ -190,7 +190,7 @@ def nearest(key: str, known: Sequence[str]) -> str | None:
         written: last
         for candidate, last in zip(named, lasts, strict=True)
         if _matches(parts[:-1], candidate.split(".")[:-1])
-        for written in (last, _without_unit(last))
+        for written in (last, without_unit(last))
     }
     close = difflib.get_close_matches(parts[-1], siblings, n=1, cutoff=0.6)
     if close:
@@ -200,11 +200,6 @@ def nearest(key: str, known: Sequence[str]) -> str | None:
         return _most_alike(key, named, close[0])
     close = difflib.get_close_matches(key, named, n=1, cutoff=0.6)
     return close[0].replace(ANY, "<name>") if close else None
-
-
-def _without_unit(name: str) -> str:
-    """A key's last part without the unit at its end."""
-    return next((name.removesuffix(end) for end in SUFFIXES if name.endswith(end)), name)
 
 
 def _most_alike(key: str, known: list[str], last: str) -> str:

@@ -32,11 +32,21 @@ def _as_list(value: Any) -> Any:
     return [value] if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
+def not_with(key: str, why: str) -> ValueError:
+    """The error of a key that is given although another one excludes it, for a reason ``why``."""
+    return ValueError(f"must not have {key} {why}{take_away()}")
+
+
+def given(table: Table, *names: str) -> list[str]:
+    """The keys among ``names`` that have a value."""
+    return [name for name in names if getattr(table, name) is not None]
+
+
 def exactly_one(table: Table, *names: str) -> None:
     """Raise ``ValueError`` unless exactly one of the keys ``names`` is given."""
-    given = [name for name in names if getattr(table, name) is not None]
-    if len(given) != 1:
-        but = "none is given" if not given else f"{' and '.join(given)} are given{take_away()}"
+    there = given(table, *names)
+    if len(there) != 1:
+        but = "none is given" if not there else f"{' and '.join(there)} are given{take_away()}"
         raise ValueError(f"needs exactly one of {', '.join(names)}, but {but}")
 
 
@@ -47,10 +57,13 @@ def either(table: Table, one: str, other: str) -> None:
         raise ValueError(f"takes {one} or {other}, but both are given{take_away()}")
 
 
-def together(table: Table, one: str, other: str) -> None:
-    """Raise ``ValueError`` if one of two keys is given alone."""
-    if (getattr(table, one) is None) != (getattr(table, other) is None):
-        raise ValueError(f"needs {one} and {other} together, but only one is given")
+def together(table: Table, *names: str) -> None:
+    """Raise ``ValueError`` if some of the keys ``names`` are given without the others."""
+    there = given(table, *names)
+    if 0 < len(there) < len(names):
+        raise ValueError(
+            f"needs {' and '.join(names)} together, but only has {' and '.join(there)}"
+        )
 
 
 def stretch(start: float, end: float) -> None:

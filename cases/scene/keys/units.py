@@ -40,6 +40,11 @@ def unit_of(key: str) -> str:
     return next((unit for suffix, unit in SUFFIXES.items() if name.endswith(suffix)), "")
 
 
+def without_unit(name: str) -> str:
+    """A key's last part without the unit at its end."""
+    return next((name.removesuffix(end) for end in SUFFIXES if name.endswith(end)), name)
+
+
 def speed_from_km_h(speed: float) -> float:
     """Speed [m/s] from ``speed`` [km/h]."""
     return speed / 3.6

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import PAIR, Table, WireName, band, take_away, within
+from catenary.cases.scene.keys.table import PAIR, Table, WireName, band, given, not_with, within
 from catenary.cases.scene.keys.units import angle_from_deg, length_from_mm
 from catenary.meshgen.line import Line
 from catenary.solver.problem import defects as solver
@@ -65,9 +65,9 @@ class HeightTable(Table):
         if self.standard_deviation_mm is None and self.by_place is None:
             raise ValueError("needs standard_deviation_mm or by_place, but none is given")
         band(self.shortest_m, self.longest_m)
-        given = [name for name in ("from_m", "to_m") if getattr(self, name) is not None]
-        if given and self.standard_deviation_mm is None:
-            raise ValueError(f"must not have {given[0]} without standard_deviation_mm{take_away()}")
+        if self.standard_deviation_mm is None:
+            for name in given(self, "from_m", "to_m"):
+                raise not_with(name, "without standard_deviation_mm")
         return self
 
 

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from catenary.cases.scene.keys.table import Table, take_away
+from catenary.cases.scene.keys.table import Table, not_with, take_away
 from catenary.solver.problem.contact_laws import (
     HYSTERESIS,
     ContactLaw,
@@ -68,9 +68,7 @@ class ContactTable(Table):
     def _consistent(self) -> ContactTable:
         for key, laws in _ACTS_WITH.items():
             if key in self.model_fields_set and self.law not in laws:
-                raise ValueError(
-                    f"must not give {key}, which does not act with law {self.law}{take_away()}"
-                )
+                raise not_with(key, f"with law {self.law}, with which it does not act")
         if self.law in WITH_RESTITUTION and self.restitution is None:
             raise ValueError(f"must give restitution, which law {self.law} is made of")
         both = {"stiffness_N_per_m", "hertz_stiffness_N_per_m1_5"} & self.model_fields_set

@@ -12,7 +12,7 @@ from pydantic import (
     model_validator,
 )
 
-from catenary.cases.scene.keys.table import Table, take_away
+from catenary.cases.scene.keys.table import Table, given, not_with, take_away, together
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,
     HHT,
@@ -128,15 +128,11 @@ class NumericsTable(Table):
     @model_validator(mode="after")
     def _stable(self) -> NumericsTable:
         if self.coupling is not None and self.scheme != "one_solve":
-            raise ValueError(
-                f"must not give coupling, which belongs to scheme one_solve, with {self.scheme}"
-                + take_away()
-            )
+            raise not_with("coupling", f"with scheme {self.scheme}, but with one_solve only")
         if self.iterations is not None:
             if self.scheme != "fixed_point":
-                raise ValueError(
-                    "must not give iterations, which belongs to scheme fixed_point, with "
-                    f"{self.scheme}{take_away()}"
+                raise not_with(
+                    "iterations", f"with scheme {self.scheme}, but with fixed_point only"
                 )
             if "max_iterations" in self.model_fields_set:
                 raise ValueError(
@@ -155,10 +151,7 @@ class NumericsTable(Table):
         smallest = self.smallest_dt_s
         if self.adaptive_tolerance_N is None:
             if smallest is not None:
-                raise ValueError(
-                    "must not give smallest_dt_s without adaptive_tolerance_N, which halves steps"
-                    + take_away()
-                )
+                raise not_with("smallest_dt_s", "without adaptive_tolerance_N, which halves steps")
             return
         if smallest is not None and not self.dt_s / MOST_DIVIDED <= smallest <= 0.5 * self.dt_s:
             raise ValueError(
@@ -171,9 +164,8 @@ class NumericsTable(Table):
         own = (self.newmark_beta, self.newmark_gamma)
         if self.integrator == NEWMARK:
             if radius is not None:
-                raise ValueError(
-                    "must not give spectral_radius, which belongs to integrators hht and "
-                    "generalized_alpha, with newmark, whose damping is newmark_gamma" + take_away()
+                raise not_with(
+                    "spectral_radius", "with integrator newmark, whose damping is newmark_gamma"
                 )
             return
         if radius is None:
@@ -186,10 +178,9 @@ class NumericsTable(Table):
                 f"not {radius:g}: take generalized_alpha for less"
             )
         if own != AVERAGE_ACCELERATION[:2]:
-            raise ValueError(
-                "must not give newmark_beta and newmark_gamma, which belong to integrator newmark, "
-                f"with {self.integrator}, whose parameters follow from spectral_radius"
-                + take_away()
+            raise not_with(
+                "newmark_beta and newmark_gamma",
+                f"with integrator {self.integrator}, whose parameters follow from spectral_radius",
             )
 
     @model_serializer(mode="wrap")
@@ -231,15 +222,10 @@ class WindowTable(Table):
 
     @model_validator(mode="after")
     def _fits_its_mode(self) -> WindowTable:
-        given = [name for name in ("tolerance", *_SPANS) if getattr(self, name) is not None]
-        if self.mode != "bounded" and given:
-            raise ValueError(
-                f"must not give {given[0]}, which belongs to mode bounded, with {self.mode}"
-                + take_away()
-            )
-        if "tolerance" in given and len(given) > 1:
-            raise ValueError(f"takes tolerance or {given[1]}, but both are given{take_away()}")
-        if len(given) == 1 and given[0] in _SPANS:
-            other = _SPANS[1 - _SPANS.index(given[0])]
-            raise ValueError(f"must give {other} with {given[0]}, or neither")
+        there = given(self, "tolerance", *_SPANS)
+        if self.mode != "bounded" and there:
+            raise not_with(there[0], f"with mode {self.mode}, but with bounded only")
+        if "tolerance" in there and len(there) > 1:
+            raise ValueError(f"takes tolerance or {there[1]}, but both are given{take_away()}")
+        together(self, *_SPANS)
         return self

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import Table, take_away
+from catenary.cases.scene.keys.table import Table, given, not_with, together
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 
 # Keys that belong together: a strip's own suspension, a head's pitch.
@@ -104,24 +104,23 @@ class StripsTable(Table):
         if self.number == 2 and self.spacing_m is None:
             raise ValueError("needs spacing_m for number = 2")
         if self.number == 1:
-            for name in ("spacing_m", *_PITCH):
-                if getattr(self, name) is not None:
-                    raise ValueError(f"must not have {name} with number = 1{take_away()}")
+            for name in given(self, "spacing_m", *_PITCH):
+                raise not_with(name, "with number = 1")
         if self.rake_deg and self.length_m is None:
             raise ValueError("needs length_m for strips with rake_deg")
         if self.rake_deg and self.pitch_inertia_kg_m2 is not None:
-            raise ValueError(
-                "must not have rake_deg with pitch_inertia_kg_m2, whose lever arms are those of "
-                f"strips that are square to the track{take_away()}"
+            raise not_with(
+                "rake_deg",
+                "with pitch_inertia_kg_m2, whose lever arms are those of strips that are square to "
+                "the track",
             )
-        for pair in (_SUSPENSION, _PITCH):
-            given = [name for name in pair if getattr(self, name) is not None]
-            if len(given) == 1:
-                raise ValueError(f"needs {' and '.join(pair)} together, but only has {given[0]}")
+        together(self, *_SUSPENSION)
+        together(self, *_PITCH)
         if self.damping_N_s_per_m > 0 and self.mass_kg is None:
-            raise ValueError(
-                "must not have damping_N_s_per_m without mass_kg and stiffness_N_per_m, because "
-                f"it acts between a strip and the head{take_away()}"
+            raise not_with(
+                "damping_N_s_per_m",
+                "without mass_kg and stiffness_N_per_m, because it acts between a strip and the "
+                "head",
             )
         return self
 

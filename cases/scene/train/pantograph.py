@@ -17,7 +17,7 @@ from pydantic import (
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import assign
-from catenary.cases.scene.keys.table import Table, ascending, exactly_one, take_away
+from catenary.cases.scene.keys.table import Table, ascending, exactly_one, given, not_with
 from catenary.cases.scene.train.head import RollTable, SomeMass, StripsTable
 from catenary.cases.scene.train.laws import AerodynamicsTable, LawTable, RegulationTable
 from catenary.cases.scene.train.mechanism import BodyTable, ForceTable, JointTable, Name
@@ -120,9 +120,7 @@ class LumpedTable(_Pressing):
         for key, values in zip(CHAIN, (ready.masses, ready.stiffnesses, ready.dampings),
                                strict=True):  # fmt: skip
             if filled.setdefault(key, list(values)) != list(values) and model in READY:
-                raise ValueError(
-                    f'must not have {key} beside model = "{model}", which has its own{take_away()}'
-                )
+                raise not_with(key, f'beside model = "{model}", which has its own')
         return filled
 
     @model_validator(mode="after")
@@ -210,43 +208,38 @@ class MultibodyTable(_Pressing):
 
     @model_validator(mode="after")
     def _consistent(self) -> MultibodyTable:
-        given = [
-            name
-            for name in ("static_force_N", "static_force_by_speed")
-            if getattr(self, name) is not None
-        ]
+        forces = ("static_force_N", "static_force_by_speed")
         if self.calibrate:
-            exactly_one(self, "static_force_N", "static_force_by_speed")
+            exactly_one(self, *forces)
             if self.actuator is None:
                 raise ValueError(
                     "needs actuator, the force to be calibrated, unless calibrate is false"
                 )
-        elif given:
-            raise ValueError(
-                f"must not have {given[0]} with calibrate = false, because the static force "
-                f"follows from the actuator{take_away()}"
+        elif there := given(self, *forces):
+            raise not_with(
+                there[0],
+                "with calibrate = false, because the static force follows from the actuator",
             )
         if self.strips.pitch_inertia_kg_m2 is not None:
-            raise ValueError(
-                "must not have strips.pitch_inertia_kg_m2, because the pitch of its head follows "
-                f"from bodies, joints and forces{take_away()}"
+            raise not_with(
+                "strips.pitch_inertia_kg_m2",
+                "because the pitch of its head follows from bodies, joints and forces",
             )
         if self.strips.rake_deg:
-            raise ValueError(
-                "must not have strips.rake_deg, because its head is pressed where a strip "
-                f"that is square to the track is{take_away()}"
+            raise not_with(
+                "strips.rake_deg",
+                "because its head is pressed where a strip that is square to the track is",
             )
-        if self.motion == "all_bodies":
-            if self.strips.mass_kg is not None:
-                raise ValueError(
-                    "must not have strips.mass_kg with motion = all_bodies, because strips on "
-                    f"springs of their own are no bodies{take_away()}"
-                )
+        if self.motion == "all_bodies" and self.strips.mass_kg is not None:
+            raise not_with(
+                "strips.mass_kg",
+                "with motion = all_bodies, because strips on springs of their own are no bodies",
+            )
         for key in _OF_ALL_BODIES:
             if self.motion == "reduced" and key in self.model_fields_set:
-                raise ValueError(
-                    f"must not have {key} with motion = reduced, because it acts only with "
-                    f"motion = all_bodies{take_away()}"
+                raise not_with(
+                    key,
+                    "with motion = reduced, because it acts only with motion = all_bodies",
                 )
         for correction in self.corrections:
             _number_at(self, correction.key)

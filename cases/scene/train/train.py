@@ -6,7 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import PAIR, Table, band, take_away, within
+from catenary.cases.scene.keys.table import (
+    PAIR,
+    Table,
+    band,
+    given,
+    not_with,
+    take_away,
+    together,
+    within,
+)
 from catenary.cases.scene.keys.units import angle_from_deg
 from catenary.mbs.vehicle.base_motion import Harmonic, Source, VehicleMotion
 from catenary.mbs.vehicle.base_motion import Table as MotionOf
@@ -87,12 +96,10 @@ class MotionTable(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> MotionTable:
-        sine = [n for n in ("amplitude_m", "frequency_hz") if getattr(self, n) is not None]
-        if len(sine) == 1:
-            raise ValueError(f"needs amplitude_m and frequency_hz together, but only has {sine[0]}")
-        if self.phase_deg and not sine:
-            raise ValueError(f"must not have phase_deg without amplitude_m{take_away()}")
-        if not sine and self.by_time is None and self.by_place is None:
+        together(self, "amplitude_m", "frequency_hz")
+        if self.phase_deg and self.amplitude_m is None:
+            raise not_with("phase_deg", "without amplitude_m")
+        if not given(self, "amplitude_m", "by_time", "by_place"):
             raise ValueError(
                 "needs by_time, by_place (or files of these) or amplitude_m, but none is given"
             )
@@ -162,10 +169,7 @@ class SuspensionTable(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> SuspensionTable:
-        given = [name for name in _BOGIE if getattr(self, name) is not None]
-        if given and len(given) < len(_BOGIE):
-            missing = " and ".join(name for name in _BOGIE if name not in given)
-            raise ValueError(f"needs {missing} together with {' and '.join(given)}")
+        together(self, *_BOGIE)
         side = self.lateral
         if side is not None:
             weight = self.body_mass_kg * GRAVITY * side.centre_above_m

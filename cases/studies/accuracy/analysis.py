@@ -267,8 +267,8 @@ def advice(
         if math.isinf(uncertainty):
             own = "has an uncertainty that is not known"
         return (
-            f"What {target:g} % in {what} takes cannot be told: the reference {own}, and "
-            "a third of the target is the most that would do."
+            f"Settings for {target:g} % in {what} are not known: the reference {own}, and must be "
+            "within a third of the target."
         )
     row = cheapest(rows, quantity, target)
     if row is None:

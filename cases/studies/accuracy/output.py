@@ -24,6 +24,7 @@ from catenary.cases.studies.accuracy.analysis import (
 from catenary.cases.studies.accuracy.axes import AXES, DISCRETISATION, Axis
 from catenary.cases.studies.accuracy.runs import Measured, PlannedAxis
 from catenary.postproc.evaluate.wording import capital, counted
+from catenary.postproc.files.disk import plain
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import (
     Column,
@@ -94,14 +95,14 @@ def _figures_of(row: Row, axis: Axis | None = None) -> dict[str, Any]:
     for name in _ADVISED:
         table[f"error_{name}_by_step_percent"] = row.by_step.get(name)
         table[f"error_{name}_by_mesh_percent"] = row.by_mesh.get(name)
-    table["estimated_history_N"] = _known(row.estimate)
-    table["rounds_per_step"] = _known(row.iterations)
-    table["march_s_per_s"] = _known(row.cost)
+    table["estimated_history_N"] = plain(row.estimate)
+    table["rounds_per_step"] = plain(row.iterations)
+    table["march_s_per_s"] = plain(row.cost)
     table["n_timed"] = row.timings
     table["remarks"] = list(row.remarks)
     of_step = axis is not None and axis.refined == "dt" and true
     ratio = row.estimate / true if of_step and true else math.nan
-    for_people = (in_words(row.level), _known(ratio), len(row.remarks) or None)
+    for_people = (in_words(row.level), plain(ratio), len(row.remarks) or None)
     return table | dict(zip(_FOR_PEOPLE, for_people, strict=True))
 
 
@@ -312,7 +313,3 @@ def _record(found: Measured, target: float) -> dict[str, Any]:
         "rows": table_of(found.rows).records(),
         "remarks": {name: list(texts) for name, texts in found.remarks.items() if texts},
     }
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value

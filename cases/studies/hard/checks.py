@@ -21,7 +21,7 @@ from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
 from catenary.cases.studies.hard.runs import RunHistories, cut_of, rest_height
 from catenary.cases.studies.records import NOTHING_KEPT, KeptRows
-from catenary.postproc.report.study_table import Column, StudyTable, remark_lines
+from catenary.postproc.report.study_table import Column, StudyTable, file_table, remark_lines
 from catenary.solver.model.beam import shape_slopes
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
@@ -383,9 +383,7 @@ def criteria(found: Sequence[Criterion], remarks_of: Remarks) -> StudyTable:
         texts = [f"{run}: {text}" for run, own in remarks.items() for text in own]
         if texts:
             rows.append((case, "remarks", str(len(texts)), "", "", "; ".join(texts)))
-    return StudyTable(
-        [Column(name) for name in names], [dict(zip(names, row, strict=True)) for row in rows]
-    )
+    return file_table(names, rows)
 
 
 def page(cases: Sequence[HardCase], found: Sequence[Criterion], remarks_of: Remarks) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,8 @@ from catenary.cases.studies.identification.measurement import UNITS
 from catenary.cases.studies.identification.pictures import draw_parameters, draw_passage
 from catenary.cases.studies.identification.posterior import RARE, Judged, is_doubtful
 from catenary.cases.studies.identification.study import Identification
-from catenary.postproc.report.study_table import Column, Content, StudyTable
+from catenary.postproc.evaluate.wording import without_sign_of_zero
+from catenary.postproc.report.study_table import Column, Content, StudyTable, file_table
 
 PARAMETERS, CORRELATION = "parameters.csv", "correlation.csv"
 DIRECTIONS, RESIDUALS, SUMMARY = "directions.csv", "residuals.csv", "identification.json"
@@ -54,21 +55,14 @@ def parameters_table(found: Identification) -> StudyTable:
 def _rounded(value: float, width: float) -> str:
     """A value with the digits that two of its deviation let it have."""
     digits = max(0, 1 - int(np.floor(np.log10(width))))
-    text = f"{value:.{digits}f}" if digits < 7 else f"{value:.3g}"
-    return text.removeprefix("-") if not text.strip("-0.") else text
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> StudyTable:
-    """A table for files."""
-    cells = [dict(zip(heads, row, strict=True)) for row in rows]
-    return StudyTable([Column(name) for name in heads], cells)
+    return without_sign_of_zero(f"{value:.{digits}f}" if digits < 7 else f"{value:.3g}")
 
 
 def correlation_table(found: Identification) -> StudyTable:
     """The posterior correlations, a row and a column for each unknown."""
     names = [one.name for one in found.unknowns]
     rows = zip(names, found.posterior.correlation.tolist(), strict=True)
-    return _table(["parameter", *names], ([name, *row] for name, row in rows))
+    return file_table(["parameter", *names], ([name, *row] for name, row in rows))
 
 
 def directions_table(found: Identification) -> StudyTable:
@@ -76,7 +70,8 @@ def directions_table(found: Identification) -> StudyTable:
     heads = ["direction", "information", *(one.name for one in found.unknowns)]
     own = found.posterior.information.tolist(), found.posterior.directions.T.tolist()
     pairs = enumerate(zip(*own, strict=True), start=1)
-    return _table(heads, ([n, information, *direction] for n, (information, direction) in pairs))
+    rows = ([n, information, *direction] for n, (information, direction) in pairs)
+    return file_table(heads, rows)
 
 
 def residuals_table(found: Identification) -> StudyTable:
@@ -87,7 +82,7 @@ def residuals_table(found: Identification) -> StudyTable:
         name = f"{signal.name.replace(' ', '_')}_{UNITS[signal.name]}"
         heads += [f"measured_{name}", f"modelled_{name}"]
         values += [signal.values, modelled + bias]
-    return _table(heads, np.column_stack(values).tolist())
+    return file_table(heads, np.column_stack(values).tolist())
 
 
 def as_text(found: Identification) -> str:

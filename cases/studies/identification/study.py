@@ -310,8 +310,8 @@ def _measurement(scene: Scene, measured: Path | pd.DataFrame, task: Task) -> Mea
     train, number = problem.train, task.measured.pantograph
     if number > len(train.placements):
         raise InputError(
-            f"measured.pantograph is {number}, and the train of the scene has "
-            f"{len(train.placements)}"
+            f"measured.pantograph is {number}; it must be from 1 to {len(train.placements)}, the "
+            "number of pantographs of the scene's train"
         )
     start = train.start - train.placements[number - 1].behind
     table, name = measured, "the measurement"
@@ -337,8 +337,8 @@ def _sought(scenes: ChangedScenes, task: Task) -> tuple[list[Parameter], list[Un
         own = _origin(parameter)
         if one.mean is not None and len(parameter.values) > 1:
             raise InputError(
-                f"{one.key} is a list whose entries change together: its prior has no mean, and "
-                "the scene's values are it"
+                f"parameters.{number}.mean must be left out: {one.key} is a list whose entries "
+                "change together from the scene's values"
             )
         mean = own if one.mean is None else one.mean
         parameters.append(parameter)
@@ -357,5 +357,5 @@ def _sought(scenes: ChangedScenes, task: Task) -> tuple[list[Parameter], list[Un
     keys = [one.name for one in unknowns]
     for key in keys:
         if keys.count(key) > 1:
-            raise InputError(f"{key} is looked for twice; take one away")
+            raise InputError(f"the task names {key} twice; name it once")
     return parameters, unknowns

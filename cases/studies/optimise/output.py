@@ -7,15 +7,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.studies.optimise.checks import AS_IS, COMPARED, Row, change
 from catenary.cases.studies.optimise.droppers import of_middle_span
 from catenary.cases.studies.optimise.objective import Point
 from catenary.cases.studies.optimise.study import Optimum, Plan
 from catenary.cases.studies.sweep.variants import text_of
-from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
+from catenary.postproc.files.disk import plain
+from catenary.postproc.report.study_table import (
+    Column,
+    Content,
+    StudyTable,
+    file_table,
+    write_files,
+)
 
 RECORD, PAGE, KEYS = "optimise.json", "optimise.md", "optimum.toml"
 DROPPERS, CHECKS, HISTORY = "droppers", "checks", "history"
@@ -76,16 +81,13 @@ def history_table(plan: Plan, history: Sequence[Point]) -> StudyTable:
     variables."""
     names = [one.name for one in plan.variables.components]
     heads = ("objective", "violation", *names, "broke")
-    rows = [
-        (_finite(one.value), _finite(one.violation), *one.change.tolist(), one.broke)
-        for one in history
-    ]
-    cells = [dict(zip(heads, row, strict=True)) for row in rows]
-    return StudyTable([Column(name) for name in heads], cells)
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    return file_table(
+        heads,
+        (
+            (plain(one.value), plain(one.violation), *one.change.tolist(), one.broke)
+            for one in history
+        ),
+    )
 
 
 def variables_table(plan: Plan, one: Optimum) -> StudyTable:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from catenary.base.errors import CatenaryError
 from catenary.cases.run.prepared import rest_of
@@ -12,7 +12,7 @@ from catenary.cases.scene.load import recorded_scene
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.study_table import Column, StudyTable, write_files
+from catenary.postproc.report.study_table import StudyTable, file_table, write_files
 
 NONE = "no cause found"
 _MOST_CAUSES = 4  # of a place in the text; tables have all
@@ -58,14 +58,14 @@ def answer_of(results: Results, count: int) -> Answer:
         lines += ["", f"Elasticity and gusts along the line are not known: {unknown}"]
     text = "\n".join([*lines, "", "Candidates are near in place or frequency; none is proved."])
     of_span = ("std_N", "max_N", "min_N", "loss_percent", "median_std_N", "stands_out")
-    spans = _table(
+    spans = file_table(
         ("span", "from_m", "to_m", "pantograph", *of_span, "causes"),
         (
             (p.span + 1, p.start, p.end, names[p.pantograph], *p[4:], causes.of_passage(p))
             for p in places.passages
         ),
     )
-    supports = _table(
+    supports = file_table(
         ("x_m", "wire", "max_uplift_mm", "median_mm", "stands_out", "causes"),
         ((*arm[1:], causes.at(arm)) for arm in places.arms),
     )
@@ -139,12 +139,7 @@ def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
         values = one.value, one.median, least, slack_s, stands_out
         cells.append((one.x, one.wire, *values, causes.at(one)))
     heads = ("x_m", "wire", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
-    return _table(heads, cells)
-
-
-def _table(heads: Sequence[str], cells: Iterable[Sequence[Any]]) -> StudyTable:
-    rows = [dict(zip(heads, own, strict=True)) for own in cells]
-    return StudyTable([Column(name) for name in heads], rows)
+    return file_table(heads, cells)
 
 
 def write(folder: Path, answer: Answer) -> list[Path]:

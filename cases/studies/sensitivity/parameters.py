@@ -226,21 +226,21 @@ class ChangedScenes:
                 )
         if parts[0] in _OF_EVALUATION:
             raise InputError(
-                f"{key} is nothing of the march, but of what is evaluated or written: a march has "
-                "no derivative by it"
+                f"{key} does not act on the march, but on its evaluation or its files: the march "
+                "has no derivative by it"
             )
         values = self._values(key)
         if values is None:
             raise InputError(
-                f"{shown(key)[1:-1]} has no value in this scene that is a number, by which a march "
-                f"could be differentiated{self._instead(parts)}"
+                f"{shown(key)[1:-1]} has no number in this scene by which a march could be "
+                f"differentiated{self._instead(parts)}"
             )
         if any(isinstance(one, int) for one in values):
             raise InputError(f"{key} is a whole number, by which a march has no derivative")
         return Parameter(key, tuple(map(float, values)))
 
     def _instead(self, parts: Sequence[str]) -> str:
-        """What the scene has where the parts of a key lead nowhere, for the end of a sentence."""
+        """The pantographs or entries that a wrong key could name, for the end of a sentence."""
         if parts[0] == "pantographs" and parts[1] not in self._raw["pantographs"]:
             return f"; its pantographs are {', '.join(self._raw['pantographs'])}"
         holder = value_at(self._raw, ".".join(parts[:-1]))
@@ -273,7 +273,7 @@ class ChangedScenes:
             for number in range(1, len(line.droppers_of_span(span - 1)) + 1):
                 found.append(self.parameter(f"{_LENGTHS}.{span}.{number}"))
         if not found:
-            raise InputError("there are no droppers in the spans whose droppers are looked for")
+            raise InputError(f"droppers.spans names {list(spans)}: these spans have no droppers")
         return found
 
     def heights_at(self, supports: Sequence[int]) -> list[Parameter]:
@@ -430,6 +430,9 @@ def parameters_of(
     if with_droppers:
         droppers = scenes.droppers()
         if not droppers:
-            raise InputError("there are no droppers in the evaluation stretch to differentiate by")
+            raise InputError(
+                f"{option('--droppers', 'droppers')}: no dropper lies between evaluation.from_m "
+                "and evaluation.to_m"
+            )
         named += [one for one in droppers if one.key not in keys]
     return named or scenes.usual()

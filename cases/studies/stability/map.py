@@ -171,7 +171,7 @@ def make_map(
     draft: Draft,
     comm: Any,
     grid: Grid,
-    tell: Callable[[str], None] = lambda line: None,
+    say: Callable[[str], None] = lambda line: None,
     kept: KeptRows = NOTHING_KEPT,
     n_at_once: int = 1,
 ) -> StabilityMap:
@@ -182,7 +182,7 @@ def make_map(
     draft : of the case
     comm : of this process alone
     grid : stiffnesses and masses of the map
-    tell : called with a line on each point that is done
+    say : called with a line on each point that is done
     kept : limits that were found before; without it all are found anew
     n_at_once : points of the map that are tried at the same time, each in a process of its own
     """
@@ -195,7 +195,7 @@ def make_map(
         return {"scene": config, "stiffness": pair[0], "head_mass": pair[1]}
 
     lost: list[WorkerLost] = []
-    with RunsBar(len(pairs), tell, what="points") as bar:
+    with RunsBar(len(pairs), say, what="points") as bar:
         for outcome in kept.each(find_all, pairs, depends_on, n_at_once, comm):
             bar.ended()
             if isinstance(outcome.error, WorkerLost):

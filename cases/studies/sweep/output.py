@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from catenary.cases.scene.input.toml_input import REMOVED, parse_assignment
 from catenary.cases.scene.keys.keys import ANY
-from catenary.cases.scene.keys.units import SUFFIXES, unit_of
+from catenary.cases.scene.keys.units import unit_of, without_unit
 from catenary.cases.studies.sweep import force_histograms
 from catenary.cases.studies.sweep.jobs import OF_LINE, OF_PANTOGRAPH, STATISTICS, Ended
 from catenary.cases.studies.sweep.variants import Variant
@@ -249,5 +249,4 @@ def _known(key: str) -> Key | None:
 
 def _plain(name: str) -> str:
     """A name as it is written in code, without its unit and with spaces."""
-    bare = next((name.removesuffix(end) for end in SUFFIXES if name.endswith(end)), name)
-    return bare.replace("_", " ")
+    return without_unit(name).replace("_", " ")

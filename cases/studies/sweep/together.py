@@ -59,7 +59,7 @@ class Ensemble(NamedTuple):
 
     @property
     def refused(self) -> list[Ended]:
-        """None is known before it is its turn."""
+        """Variants that cannot be run: none is known before its turn."""
         return []
 
     def run(

@@ -98,7 +98,9 @@ def groups_of(tables: Sequence[ErrorKind], scene: Scene) -> list[Group]:
     ]
     for number, key in enumerate(keys):
         if key in keys[:number]:
-            raise InputError(f"errors.{number} are of {key}, of which there are errors before")
+            raise InputError(
+                f"errors.{number} are of {key}, as errors.{keys.index(key)} are; give one of them"
+            )
     return [_group(table, scene, f"errors.{number}") for number, table in enumerate(tables)]
 
 
@@ -131,9 +133,7 @@ def _group(table: ErrorKind, scene: Scene, where: str) -> Group:
         known = [wire.name for wire in line.wires]
         for wire in table.wires:
             if wire not in known:
-                raise InputError(
-                    f"{where}.wires has {wire}, which the line has not; it has {', '.join(known)}"
-                )
+                raise InputError(f"{where}.wires has {wire}, but the line has {', '.join(known)}")
         near = np.ones(len(table.wires), dtype=bool)
         return Group(table, table.wires, near, "%", table.wires, tables.get("defects", []))
     return _of_key(table, tables, where)

@@ -54,7 +54,7 @@ def margins_of(summary: Mapping[str, Any], criteria: Sequence[BoundTable]) -> Ma
 
 
 def _judged(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What the standard has judged of a run."""
+    """Criteria by which the rule books have judged a run."""
     return [row for row in summary["acceptance"] if row["passed"] is not None]
 
 
@@ -108,10 +108,14 @@ def names_of(margins: Sequence[Margins]) -> list[str]:
         If a run broke, or nothing is judged.
     """
     if any("" in one for one in margins):
-        raise InputError("a run of the case without errors broke, so that it has no criteria")
+        raise InputError(
+            "the case breaks without errors, so that it has no criteria: try it with `catenary run`"
+        )
     found = list(dict.fromkeys(name for one in margins for name in one))
     if not found:
-        raise InputError("the standard judges no run of the set: name criteria in the task")
+        raise InputError(
+            "the rule books of the scene judge no run of the set: name criteria in the task"
+        )
     return found
 
 
@@ -222,7 +226,7 @@ def make_plan(draft: Draft, task: ToleranceTask) -> Plan:
         if group.table.level > group.table.most:
             raise InputError(
                 f"errors {group.table.name}: level is {group.table.level:g} {group.unit}; it must "
-                f"be at most {group.table.most:g}, which is most"
+                f"be at most most, {group.table.most:g} {group.unit}"
             )
         for sign in (1.0, -1.0):
             largest = group.values(np.full(len(group.names), sign * group.table.most))

@@ -17,7 +17,7 @@ ASSIGNMENTS = {
     "unknown integrator": (["numerics.integrator=rk4"], "newmark, hht or generalized_alpha"),
     "spectral radius of Newmark": (
         ["numerics.spectral_radius=0.8"],
-        "belongs to integrators hht and generalized_alpha",
+        "must not have spectral_radius with integrator newmark",
     ),
     "no spectral radius": (
         ["numerics.integrator=generalized_alpha"],
@@ -38,7 +38,7 @@ ASSIGNMENTS = {
             "numerics.newmark_gamma=0.55",
             "numerics.newmark_beta=0.28",
         ],
-        "belong to integrator newmark",
+        "must not have newmark_beta and newmark_gamma with integrator",
     ),
     "kinematic contact by another method": (
         [

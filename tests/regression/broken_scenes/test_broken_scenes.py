@@ -187,7 +187,7 @@ ASSIGNMENTS = {
             "vehicle.irregularity.spectrum=fra_6",
             f"vehicle.suspension={{{CAR},bogie_mass_kg=2600}}",
         ],
-        "needs primary_stiffness_N_per_m and primary_damping_N_s_per_m together with bogie_mass_kg",
+        "primary_damping_N_s_per_m together, but only has bogie_mass_kg",
     ),
     "car that turns over": (
         [

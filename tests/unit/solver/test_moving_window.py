@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from measuring import COMM, History, check, start_march
+from measuring import COMM, History, check, continued, start_march
 from scenes import load_scene
 from scenes import mesh_of as scene_mesh
 from scenes import problem_of as scene_problem
@@ -228,16 +228,7 @@ def test_no_window_ends_where_elements_are_too_short_to_be_held(
 def test_a_window_goes_on_after_a_restart_as_if_nothing_had_happened() -> None:
     problem, mesh = scene(0.5)
     problem = replace(problem, window=WindowChoice(BOUNDED, None, 2, 2))
-    kept: list[Any] = []
-    whole = History(lambda view: kept.append(view.checkpoint()) if view.step == 203 else None)
-    march, _ = start_march(problem, mesh)
-    march.run([whole])
-    march.destroy()
-    rest = History()
-    again, _ = start_march(problem, mesh)
-    again.restore(kept[0])
-    again.run([rest])
-    again.destroy()
+    whole, rest = continued(problem, mesh, 203)
     assert np.array_equal(rest["contact_force"], whole["contact_force"][203:])
 
 

@@ -1,4 +1,4 @@
-"""Stations of many unknowns: right-hand sides by M, sparse blocks, columns cut short."""
+"""Stations of many unknowns: right-hand sides by M, sparse blocks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from small_lines import mesh_of, numerics, problem_of
 
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.make_line import make_line
-from catenary.solver.linear import unit_responses
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
@@ -84,26 +83,4 @@ def test_a_window_beyond_which_the_line_is_bent_multiplies_with_stiffness() -> N
     assert moving.window.moves
     made = line(replace(model(), problem=moving), NEWMARK)
     assert made.passes is not None and not made.passes.by_mass
-    made.destroy()
-
-
-def test_columns_of_long_reach_end_where_forces_are_felt(monkeypatch: pytest.MonkeyPatch) -> None:
-    # As much damping as the paper's lets a force along the track reach ten times as far.
-    found = damped(Damping(0.0275, 0.0))
-    made = line(found, NEWMARK)
-    nodes = found.mesh.wires["contact_wire"][20:120:9]
-    dofs = found.dofs(nodes)[:, None, None]
-    given = dofs, np.ones(dofs.shape), found.mesh.x(nodes)
-    short = made.responses.columns(*given)
-    monkeypatch.setattr(unit_responses, "_LONG", np.inf)
-    whole = made.responses.columns(*given)
-    assert short.reach <= whole.reach and short.data.size <= whole.data.size
-    for place in range(nodes.size):
-        columns = []
-        for kept in (short, whole):
-            column = np.zeros(found.n_dofs)
-            begin, at, width = kept.start[place], kept.at[place], kept.width[place]
-            column[begin : begin + width] = kept.data[at : at + width]
-            columns.append(column)
-        assert np.abs(columns[0] - columns[1]).max() < 1e-13 * np.abs(columns[1]).max()
     made.destroy()
