@@ -274,10 +274,11 @@ def _needs_on(scene: Scene, job: SlurmJob) -> tuple[float, float]:
     from catenary.cases.run.planning.many_ranks import march_on
     from catenary.cases.run.planning.plan import make_plan
     from catenary.cases.scene.cost_model import MEMORY_OF_RANK_PER_UNKNOWN
+    from catenary.cases.scene.problem import problem_of
     from catenary.postproc.evaluate.wording import duration
 
     plan = make_plan(scene)
-    march = march_on(scene, plan.needs.march, job.ranks)
+    march = march_on(problem_of(scene), plan.needs, plan.n_dofs, job.ranks)
     if job.ranks > 1 and march >= plan.needs.march:
         console.warn(
             f"On {job.ranks} ranks the march takes about {duration(march)}, on one "

@@ -12,6 +12,8 @@ from verb_runner import invoke
 
 from catenary.cases.run.planning import many_ranks
 from catenary.cases.run.planning.many_ranks import Sizes, Wire, Work, march_on, predict
+from catenary.cases.run.planning.plan import make_plan
+from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies import scaling
 from catenary.cases.studies.scaling import as_text
 from catenary.solver.contact.line_response import Bounds, LineResponse
@@ -46,12 +48,14 @@ def test_messages_are_as_long_as_those_of_a_march() -> None:
 
 
 def test_ranks_shorten_the_march_of_a_long_line_alone() -> None:
-    long = load_scene("ambrosio2012", ["line.n_spans=2000"])
-    short = load_scene("ambrosio2012", ["line.n_spans=25"])
-    windowed = load_scene("ambrosio2012", ["line.n_spans=2000", "window.mode=bounded"])
-    assert march_on(long, 100.0, 1) == march_on(windowed, 100.0, 64) == 100.0
-    assert 100.0 / 64 < march_on(long, 100.0, 64) < 100.0 / 8
-    assert march_on(short, 100.0, 64) > 100.0
+    def gain(ranks: int, *words: str) -> float:
+        scene = load_scene("ambrosio2012", list(words))
+        plan = make_plan(scene)
+        return plan.needs.march / march_on(problem_of(scene), plan.needs, plan.n_dofs, ranks)
+
+    assert gain(1, "line.n_spans=2000") == gain(64, "line.n_spans=2000", "window.mode=bounded") == 1
+    assert 8 < gain(64, "line.n_spans=2000") < 64
+    assert gain(64, "line.n_spans=25") < 1
 
 
 def test_one_rank_exchanges_nothing_and_times_nothing() -> None:

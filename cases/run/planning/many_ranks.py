@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from catenary.cases.run.planning.needs import needs_with_mesh
+from catenary.cases.run.planning.needs import Needs, needs_with_mesh
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.cost_model import STEP_OVERHEAD
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.solver.effects.build_model import numbering_of
-from catenary.solver.problem.problem import OFF
+from catenary.solver.problem.problem import Problem
 
 # Bytes of a number; numbers before the answers in a share, before the forces in a reply, and links
 # with their compensations that a reply has room for.
@@ -92,11 +92,16 @@ class Predicted(NamedTuple):
 
 
 def work_of(scene: Scene) -> Work:
-    """Work of a step of a scene: its time on one rank, by the estimate of ``catenary plan``, and
-    its messages on several. Not collective."""
+    """Work of a step of a scene, whose mesh it makes. Not collective."""
     problem, mesh = problem_of(scene), mesh_of(scene)
-    needs = needs_with_mesh(scene, mesh)
-    n_unknowns, n_spans = numbering_of(problem, mesh).n_unknowns, problem.line.n_spans
+    n_unknowns = numbering_of(problem, mesh).n_unknowns
+    return work_in(problem, needs_with_mesh(scene, mesh), n_unknowns)
+
+
+def work_in(problem: Problem, needs: Needs, n_unknowns: int) -> Work:
+    """Work of a step of a problem: its time on one rank, by the estimate of ``catenary plan``, and
+    its messages on several. Not collective."""
+    n_spans = problem.line.n_spans
     contacts = sum(len(place.data.strips.offsets) for place in problem.train.placements)
     share = _FLAGS + 2 * contacts * (1 + contacts)
     reply = _HEAD + contacts + 2 * _LINKS
@@ -128,12 +133,11 @@ def predict(work: Work, wire: Wire, ranks: int) -> Predicted:
 USUAL = Wire(5e-6, 2e-10)
 
 
-def march_on(scene: Scene, march: float, ranks: int) -> float:
+def march_on(problem: Problem, needs: Needs, n_unknowns: int, ranks: int) -> float:
     """Predicted time of a march on ``ranks`` ranks, each with a core of its own [s].
 
-    Not collective. ``march`` is its time on one rank [s], which a march with a window always takes.
+    Not collective. A march with a window takes one rank, whatever their number.
     """
-    if ranks == 1 or scene.window.mode != OFF:
-        return march
-    work = work_of(scene)
-    return march * predict(work, USUAL, ranks).step / work.step
+    if ranks == 1 or problem.window.moves:
+        return needs.march
+    return needs.n_steps * predict(work_in(problem, needs, n_unknowns), USUAL, ranks).step
