@@ -247,11 +247,13 @@ def submit(
         ranks, nodes, minutes, chain, directives or [], before or [], "B:" if array else ""
     )
     if array is None:
-        from catenary.cases.run.planning.plan import make_plan
+        from catenary.cases.run.continuing import refuse_other_scene
         from catenary.cases.scene.load import load_scene
+        from catenary.postproc.files.own_files import RUN_FILE
 
-        needs = make_plan(load_scene(words.case, chosen, words.shortened)).needs
-        script = slurm_script(case_words, out, job, needs.march, needs.memory, options)
+        scene = load_scene(words.case, chosen, words.shortened)
+        refuse_other_scene(out / RUN_FILE, scene)
+        script = slurm_script(case_words, out, job, *_needs_on(scene, job), options)
     else:
         script = _array_script(words, case_words, out, job, array, vary, named, study)
     if only_print:
@@ -265,6 +267,25 @@ def submit(
     number = _sbatch(script, "--parsable").partition(";")[0]
     last = _sbatch(script, "--parsable", "--array=0", f"--dependency=afterany:{number}")
     console.say(f"job {number}: {array} tasks; job {last.partition(';')[0]}: the table, after them")
+
+
+def _needs_on(scene: Scene, job: SlurmJob) -> tuple[float, float]:
+    """Time of the march on the ranks of a job [s], and memory of its fullest node [B]."""
+    from catenary.cases.run.planning.many_ranks import march_on
+    from catenary.cases.run.planning.plan import make_plan
+    from catenary.cases.scene.cost_model import MEMORY_OF_RANK_PER_UNKNOWN
+    from catenary.cases.scene.problem import problem_of
+    from catenary.postproc.evaluate.wording import duration
+
+    plan = make_plan(scene)
+    march = march_on(problem_of(scene), plan.needs, plan.n_dofs, job.ranks)
+    if job.ranks > 1 and march >= plan.needs.march:
+        console.warn(
+            f"On {job.ranks} ranks the march takes about {duration(march)}, on one "
+            f"{duration(plan.needs.march)}: take --ranks 1."
+        )
+    others = (job.a_node - 1) * MEMORY_OF_RANK_PER_UNKNOWN * plan.n_dofs
+    return march, plan.needs.memory + others
 
 
 def _array_script(

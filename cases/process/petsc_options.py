@@ -64,9 +64,14 @@ def as_arguments(table: Mapping[str, Any], command_line: Sequence[str] = ()) -> 
 
 
 def start_petsc(arguments: Sequence[str]) -> None:
-    """Start PETSc with these options and without options files. Collective.
+    """Start PETSc with these options and without options files of its own. Collective.
 
     If PETSc runs already, which happens only inside other Python programs, they are added.
+
+    Raises
+    ------
+    InputError
+        On all ranks, if an option keeps PETSc from starting.
     """
     import petsc4py
 
@@ -74,8 +79,14 @@ def start_petsc(arguments: Sequence[str]) -> None:
     from catenary.base.python_signals import python_signals_kept
 
     running = "petsc4py.PETSc" in sys.modules
-    with python_signals_kept(), settings():
-        petsc4py.init(["catenary", "-skip_petscrc", *arguments])
+    try:
+        with python_signals_kept(), settings():
+            petsc4py.init(["catenary", "-skip_petscrc", *arguments])
+    except RuntimeError as error:  # an error of PETSc, which prints its cause by itself
+        raise InputError(
+            "PETSc does not start with its options, those after -- and in PETSC_OPTIONS: its "
+            f"message above names the fault ({error})"
+        ) from error
     from catenary.base.petsc import PETSc
 
     if running and arguments:

@@ -2,8 +2,9 @@
 
 A lock is a file that is linked into place, which is one operation on local disks and over NFS. It
 names its process; where the kernel has ``flock`` the process also holds that. A lock that a dead
-process of this machine left is taken over. Whether a process on another machine is dead cannot be
-found out: the message has its last sign of life, and the user removes the file.
+process of this machine left is taken over, and that of a SLURM job that has ended. Whether another
+process on another machine is dead cannot be found out: the message has its last sign of life, and
+the user removes the file.
 
 The package filelock is no replacement. Its flock says nothing on disks that keep locks to one host
 (Lustre with localflock, NFS with local_lock), its soft lock stays after a kill on another host, and
@@ -17,6 +18,7 @@ import errno
 import fcntl
 import json
 import os
+import re
 import socket
 import stat
 import threading
@@ -33,6 +35,9 @@ from catenary.postproc.files.disk_errors import code_of, reason, remedy
 
 _PROC = Path("/proc")
 _LARGEST_PID = 2**31
+# Numbers of the SLURM jobs that a job waited for the end of, in its environment.
+JOBS_ENDED = "CATENARY_JOBS_ENDED"
+_JOB = re.compile(r"[0-9]{1,18}\.[0-9]{1,9}", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,7 @@ class Owner:
     pid, started : process, and its start by the kernel's clock
     command : work of the process in words, for the user
     since : when the lock was taken, in the machine's local time
+    job : number of the SLURM job, a point, how often SLURM had started it again; empty elsewhere
     """
 
     host: str
@@ -57,6 +63,7 @@ class Owner:
     started: str
     command: str
     since: str
+    job: str = ""
 
     def text(self) -> str:
         """Text of the lock file: the owner as JSON."""
@@ -79,6 +86,15 @@ class Owner:
         """Whether ``other`` ran on this machine before its last start, and is no more."""
         same = self.host == other.host and bool(self.machine) and self.machine == other.machine
         return same and bool(other.boot) and self.boot != other.boot
+
+    def after_job_of(self, other: Owner) -> bool:
+        """Whether the SLURM job of ``other`` has ended: this one waited for its end, or is the same
+        one started again."""
+        if not other.job:
+            return False
+        number, mine = other.job.split("."), self.job.split(".")
+        again = number[0] == mine[0] and int(number[-1]) < int(mine[-1])
+        return again or number[0] in os.environ.get(JOBS_ENDED, "").split()
 
     @property
     def alive(self) -> bool:
@@ -106,7 +122,13 @@ def myself(command: str) -> Owner:
         started=_started(os.getpid()),
         command=command,
         since=time.strftime("%Y-%m-%d %H:%M:%S"),
+        job=_slurm_job(),
     )
+
+
+def _slurm_job() -> str:
+    job = f"{os.environ.get('SLURM_JOB_ID', '')}.{os.environ.get('SLURM_RESTART_COUNT') or 0}"
+    return job if _JOB.fullmatch(job) else ""
 
 
 def read_owner(text: str) -> Owner | None:
@@ -118,6 +140,7 @@ def read_owner(text: str) -> Owner | None:
         return None
     words = (value for name, value in asdict(owner).items() if name != "pid")
     sound = all(isinstance(word, str) and (word.isprintable() or not word) for word in words)
+    sound = sound and (not owner.job or _JOB.fullmatch(owner.job) is not None)
     return owner if sound and 0 < owner.pid < _LARGEST_PID else None
 
 
@@ -372,7 +395,8 @@ def _dead(old: int, owner: Owner | None, me: Owner) -> bool:
     if owner.same_processes(me):
         return not owner.alive
     # flock covers all containers on one kernel, and no other machine.
-    return me.before_restart(owner) or (owner.same_boot(me) and let_go)
+    ended = me.before_restart(owner) or me.after_job_of(owner)
+    return ended or (owner.same_boot(me) and let_go)
 
 
 def _in_use(folder: Path, owner: Owner | None, silence: float) -> str:

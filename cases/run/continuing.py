@@ -16,6 +16,7 @@ from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
+from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.committed_rows import fault_to_continue
@@ -91,6 +92,24 @@ def _refuse_open(file: Path) -> None:
     if any(os.path.samefile(name, file) for name in there):
         raise InputError(
             f"{file} is open in this program: close() the run that reads it, then continue it"
+        )
+
+
+def refuse_other_scene(result: Path, scene: Scene) -> None:
+    """Raise InputError if there is a result file that is done or another scene's. Not collective.
+
+    For jobs, which continue what they find in their folder.
+    """
+    if not result.exists():
+        return
+    with Results(result) as results:
+        config, complete = results.attributes["config"], results.complete
+    if complete:
+        raise InputError(f"the run in {result} is done; name another folder with -o")
+    if resolved(extended_scene(config, str(result), None, None)) != resolved(scene):
+        raise InputError(
+            f"{result} holds the beginning of another scene's run, which a job would continue; "
+            "name another folder with -o, or remove that file"
         )
 
 

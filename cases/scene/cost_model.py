@@ -36,6 +36,9 @@ MEMORY_PER_UNKNOWN = 800.0  # [B]
 # The same where a window of spans moves with the train, of 10 000 spans: matrices and factors are
 # made near the train alone, and the line makes room for the report.
 MEMORY_PER_UNKNOWN_AT_REST = 340.0  # [B]
+# Each further rank holds mesh and model of the whole line: ranks 1 to 3 of four on 1000 and 5000
+# spans of ambrosio2012, beyond the 141 MB that they take on a short line, had 244 and 232 B.
+MEMORY_OF_RANK_PER_UNKNOWN = 250.0  # [B]
 # Memory of a step, as the report takes the history of one pantograph after the other.
 MEMORY_PER_STEP = 40.0  # [B]
 

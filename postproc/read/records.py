@@ -185,6 +185,8 @@ def _invalid(
     bad = np.zeros(part.stop - part.start, dtype=bool)
     for first in range(0, n_columns, _COLUMNS):
         columns = (slice(first, first + _COLUMNS),) if table.ndim == 2 else ()
+        if may_be_nan and columns and _unwritten(table, part, columns[0]):
+            continue
         values = np.asarray(table[(part, *columns)]).reshape(bad.size, -1)
         # Not true of NaN. As good as all blocks are valid, and this makes no arrays.
         if values.size and -most <= values.min() and values.max() <= most:
@@ -193,6 +195,30 @@ def _invalid(
             valid = np.abs(values) <= most
         bad |= ~(valid | np.isnan(values) if may_be_nan else valid).all(axis=1)
     return bad
+
+
+def _unwritten(table: h5py.Dataset, part: slice, columns: slice) -> bool:
+    """Whether part of a table reads as NaN because none of its chunks was ever written.
+
+    With a window those are most of a long line, and HDF5 takes longer to fill them than it marched.
+    """
+    if not table.chunks or not np.isnan(table.fillvalue):
+        return False
+    down, across = table.chunks
+    last = min(columns.stop, table.shape[1])
+    return not any(
+        _is_written(table, (row, column))
+        for row in range(part.start - part.start % down, part.stop, down)
+        for column in range(columns.start - columns.start % across, last, across)
+    )
+
+
+def _is_written(table: h5py.Dataset, corner: tuple[int, int]) -> bool:
+    """Whether the chunk at a corner is in the file; of one that cannot be read that is supposed."""
+    try:
+        return len(table.id.read_direct_chunk(corner)[1]) > 0
+    except HDF5_ERRORS as error:
+        return "not allocated" not in str(error)
 
 
 def _in_order(table: h5py.Dataset, n: int, dt: float | None) -> int:

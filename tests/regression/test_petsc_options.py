@@ -39,6 +39,15 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+def test_options_with_which_petsc_does_not_start_are_refused(tmp_path: Path) -> None:
+    done = catenary(*short_run(tmp_path / "out"), "--", "-options_file", "none", cwd=tmp_path)
+    assert done.code == 2
+    assert "Unable to open options file none" in done.stderr, "PETSc says it"
+    (sentence,) = done.sentences
+    assert sentence.startswith("catenary: PETSc does not start with its options")
+    assert "Traceback" not in done.stderr and not (tmp_path / "out").exists()
+
+
 def test_views_show_stepper_solver_and_stages(tmp_path: Path) -> None:
     out = tmp_path / "out"
     options = ["-march_ts_view", "-march_ksp_view", "-march_ts_monitor", "-log_view"]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 import subprocess
 from pathlib import Path
 
 import pytest
-from program import assert_same_histories, catenary, write_program
+from program import SHORT_SCENE, assert_same_histories, catenary, short_run, write_program
 
 from catenary import InputError
 from catenary import open as open_run
@@ -92,6 +93,73 @@ def test_bad_input_ends_the_chain(tmp_path: Path) -> None:
     script = slurm_script(["no_such_case"], out, SlurmJob(), 1.0, 1e9)
     code, calls = job(script, programs, out)
     assert code == 2 and calls[-1] == "scancel left= 42"
+
+
+@pytest.mark.parametrize(
+    ("code", "begun", "outcome", "goes_on"),
+    [
+        (1, True, "interrupted", True),
+        (1, True, "", True),  # srun tells of a killed task so
+        (137, True, "", True),
+        (137, False, "", True),
+        (143, True, "interrupted", True),
+        (1, False, "", False),
+        (1, True, "NaN at t = 2 s", False),
+        (2, True, "interrupted", False),
+    ],
+)
+def test_a_chain_goes_on_where_the_next_job_may_get_further(
+    code: int, begun: bool, outcome: str, goes_on: bool, tmp_path: Path
+) -> None:
+    """A run that a job before it had left as it is said here ends with ``code``."""
+    programs, out = stand_in(tmp_path / "slurm"), tmp_path / "out"
+    out.mkdir()
+    if begun:
+        (out / "run.h5").touch()
+    if outcome:
+        (out / "summary.json").write_text(json.dumps({"outcome": outcome}, indent=1))
+    (programs / "catenary").unlink()
+    (programs / "catenary").write_text(f"#!/bin/bash\nexit {code}\n")
+    (programs / "catenary").chmod(0o755)
+    ended, calls = job(slurm_script(["x"], out, SlurmJob(), 1.0, 1e9), programs, out)
+    assert ended == code
+    assert [call.split()[0] for call in calls] == (["sbatch"] if goes_on else ["sbatch", "scancel"])
+
+
+def test_a_job_knows_the_numbers_of_all_before_it(tmp_path: Path) -> None:
+    programs, out = stand_in(tmp_path / "slurm"), tmp_path / "out"
+    (programs / "sbatch").write_text('#!/bin/bash\necho "$CATENARY_JOBS_ENDED" > "$STAND_IN/calls"')
+    script = slurm_script(["no_such_case"], out, SlurmJob(), 1.0, 1e9)
+    assert job(script, programs, out)[1] == [" 41"]
+    assert job(script, programs, out, CATENARY_JOBS_ENDED=" 7 9")[1] == [" 7 9 41"]
+
+
+def test_the_fullest_node_has_room_for_its_ranks(tmp_path: Path) -> None:
+    """Rank 0, whose memory is that of the plan, stands on one node, whatever their number."""
+    script = slurm_script(["x"], tmp_path, SlurmJob(ranks=5, nodes=4), 1.0, 10e9)
+    lines = script.splitlines()
+    assert "#SBATCH --ntasks-per-node=2" in lines
+    assert "#SBATCH --mem=13G" in lines, "1.2 x 10 GB, and 0.3 GB of libraries for two ranks"
+
+
+def test_a_folder_of_another_run_is_refused(tmp_path: Path) -> None:
+    words = ["submit", "en50318_2002", "--print", "-o", str(tmp_path / "out")]
+    begun = [*short_run(tmp_path / "out"), "--", "-march_ts_max_steps", "150"]
+    assert catenary(*begun, cwd=tmp_path).code == 1
+    same = [word for key in SHORT_SCENE for word in ("--set", key)]
+    assert catenary(*words, *same, cwd=tmp_path).code == 0
+    other = catenary(*words, *same, "--set", "train.speed_km_h=251", cwd=tmp_path)
+    assert other.code == 2 and "the beginning of another scene's run" in other.stderr
+    assert catenary("restart", str(tmp_path / "out"), "--no-report", cwd=tmp_path).code == 0
+    done = catenary(*words, *same, cwd=tmp_path)
+    assert done.code == 2 and "is done; name another folder" in done.stderr
+
+
+def test_ranks_that_make_nothing_faster_are_told(tmp_path: Path) -> None:
+    words = ["submit", "en50318_2002", "--print", "-o", "out", "--set", "window.mode=bounded"]
+    assert "WARNING" not in catenary(*words, cwd=tmp_path).stderr
+    warned = catenary(*words, "--ranks", "4", cwd=tmp_path)
+    assert warned.code == 0 and "take --ranks 1" in warned.stderr
 
 
 def test_words_of_strangers_stay_words(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ import pytest
 from catenary import InputError
 from catenary.cases.result_folder import folder_lock
 from catenary.cases.result_folder.folder_lock import (
+    JOBS_ENDED,
     LOCK_FILE,
     FolderLock,
     Owner,
@@ -38,6 +39,44 @@ def left_by(folder: Path, **changed: object) -> Path:
     path = folder / LOCK_FILE
     path.write_text(dataclasses.replace(myself("catenary run case"), **changed).text())
     return path
+
+
+LOST_NODE = {"host": "node7", "machine": "m", "boot": "b", "space": "s", "job": "41.0"}
+
+
+@pytest.mark.parametrize(
+    ("variables", "taken"),
+    [
+        ({}, False),
+        ({"SLURM_JOB_ID": "42"}, False),
+        ({"SLURM_JOB_ID": "41"}, False),
+        ({"SLURM_JOB_ID": "42", JOBS_ENDED: " 40 410"}, False),
+        ({"SLURM_JOB_ID": "42", JOBS_ENDED: " 40 41"}, True),
+        ({"SLURM_JOB_ID": "41", "SLURM_RESTART_COUNT": "1"}, True),
+    ],
+)
+def test_jobs_take_over_what_ended_jobs_left_on_other_nodes(
+    variables: dict[str, str], taken: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("SLURM_JOB_ID", "SLURM_RESTART_COUNT", JOBS_ENDED):
+        monkeypatch.delenv(name, raising=False)
+    lock = left_by(tmp_path / "out", **LOST_NODE)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    if taken:
+        held = FolderLock(lock.parent, "catenary restart")
+        owner = read_owner(lock.read_text())
+        assert owner is not None and owner.pid == os.getpid()
+        assert owner.job == f"{variables['SLURM_JOB_ID']}.{variables.get('SLURM_RESTART_COUNT', 0)}"
+        held.release()
+    else:
+        with pytest.raises(InputError, match="in use by process"):
+            FolderLock(lock.parent, "catenary restart")
+
+
+@pytest.mark.parametrize("job", ["41", "41.x", "41.0.0", "41.0\n", "."])
+def test_a_lock_with_no_number_of_a_job_names_no_process(job: str) -> None:
+    assert read_owner(dataclasses.replace(myself("catenary run"), job=job).text()) is None
 
 
 @pytest.mark.parametrize("kind", ["pipe", "link", "folder"])

@@ -246,6 +246,7 @@ def scaling(
 ) -> int:
     """Collective."""
     from catenary.base.parallel import launched_by_mpirun, on_root
+    from catenary.cases.run.planning.many_ranks import Wire, Work, work_of
     from catenary.cases.studies import scaling as study
     from catenary.cases.studies.sweep.variants import whole_numbers
 
@@ -258,7 +259,7 @@ def scaling(
                 f"--latency-us {latency:g} must be above 0 and at most 1e6, --bandwidth-GB-per-s "
                 f"{bandwidth:g} between 1e-6 and 1e6"
             )
-        given = study.Wire(1e-6 * latency, 1e-9 / bandwidth)
+        given = Wire(1e-6 * latency, 1e-9 / bandwidth)
     numbers = whole_numbers(ranks, "--ranks", 1, study.MOST_RANKS, "64,512,4096")
     comm = console.world() if launched_by_mpirun() else None
     several = comm is not None and comm.size > 1
@@ -268,8 +269,8 @@ def scaling(
             "--latency-us and --bandwidth-GB-per-s"
         )
 
-    def work() -> study.Work:
-        return study.work_of(words.load())
+    def work() -> Work:
+        return work_of(words.load())
 
     found = on_root(comm, work, takes_long=True) if comm is not None else work()
     wire, exchange = given, None

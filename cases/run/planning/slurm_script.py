@@ -2,7 +2,8 @@
 
 Before the limit of its time SLURM sends a job SIGTERM; the run then ends with its next step, and
 the next job of the chain continues it. The next job waits until this one has failed, which a lost
-node does as well; SLURM takes it away when the run is done.
+node does as well; SLURM takes it away when the run is done. Each knows the numbers of those before
+it, whose lock on the folder it takes over.
 
 Of a sweep or study a job array makes the runs, a last job the table. A task that SIGTERM comes to
 asks to be started again, as SLURM does by itself after a lost node. What is done is not run again.
@@ -19,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from catenary.base.errors import InputError
+from catenary.cases.result_folder.folder_lock import JOBS_ENDED
 from catenary.cases.run.planning.needs import NeedsOfRuns
 
 # Factor on the estimate of a job's time, the most that a start and a report take, and the
@@ -41,6 +43,7 @@ class SlurmJob:
     directives : further options of sbatch, such as ``--account=track``
     before : lines of shell before the run, such as ``module load catenary``
     signalled : "B:" if the shell of the script gets the signal of the limit, "" if its programs do
+    a_node : ranks of the fullest node
     """
 
     ranks: int = 1
@@ -50,6 +53,10 @@ class SlurmJob:
     directives: list[str] = field(default_factory=list)
     before: list[str] = field(default_factory=list)
     signalled: str = ""
+
+    @property
+    def a_node(self) -> int:
+        return math.ceil(self.ranks / self.nodes)
 
 
 def slurm_script(
@@ -66,7 +73,8 @@ def slurm_script(
     ----------
     words : arguments of ``catenary run`` but the folder
     out : folder of the results
-    march_s, memory : estimates of a plan on one rank [s], [B]
+    march_s : estimate of the march on all ranks of the job [s]
+    memory : estimate of the node that takes most, beside libraries [B]
     petsc_options : options after --, which a job that continues the run takes as well
 
     Raises
@@ -75,12 +83,13 @@ def slurm_script(
         If there are more nodes than ranks, or a directive is none.
     """
     return _SCRIPT.format(
-        options="\n".join(directives_of(job, out, march_s / job.ranks, memory)),
+        options="\n".join(["#SBATCH --no-requeue", *directives_of(job, out, march_s, memory)]),
         before="".join(f"{line}\n" for line in job.before),
         out=shlex.quote(str(out.absolute())),
         words=" ".join(map(shlex.quote, words)),
         petsc=after_dashes(petsc_options or []),
         chain=job.chain,
+        ended=JOBS_ENDED,
     )
 
 
@@ -91,7 +100,7 @@ def directives_of(job: SlurmJob, out: Path, march_s: float, memory: float) -> li
     ----------
     out : folder of the results, whose name the job takes
     march_s : estimate of the marches on all its ranks [s]
-    memory : estimate of what its ranks hold together beside libraries [B]
+    memory : estimate of the node that takes most, beside libraries [B]
 
     Raises
     ------
@@ -107,11 +116,12 @@ def directives_of(job: SlurmJob, out: Path, march_s: float, memory: float) -> li
             )
     minutes = job.minutes or limit_minutes(march_s)
     name = re.sub(r"[^A-Za-z0-9_.-]", "_", f"catenary-{out.name or 'run'}")[:60]
-    a_node = math.ceil((1.2 * memory + 0.3 * _GB * job.ranks) / job.nodes / _GB)
+    a_node = math.ceil((1.2 * memory + 0.3 * _GB * job.a_node) / _GB)
     options = [
         f"--job-name={name}",
         f"--nodes={job.nodes}",
         f"--ntasks={job.ranks}",
+        f"--ntasks-per-node={job.a_node}",
         "--cpus-per-task=1",
         f"--mem={a_node}G",
         f"--time={minutes // 60:02d}:{minutes % 60:02d}:00",
@@ -142,8 +152,9 @@ out={out}
 left=${{CATENARY_JOBS_LEFT:-{chain}}}
 next=
 if [ "$left" -gt 0 ]; then
-    next=$(CATENARY_JOBS_LEFT=$((left - 1)) sbatch --parsable --export=ALL \\
-        --kill-on-invalid-dep=yes --dependency="afternotok:$SLURM_JOB_ID" "$0")
+    next=$(CATENARY_JOBS_LEFT=$((left - 1)) {ended}="${{{ended}:-}} $SLURM_JOB_ID" \\
+        sbatch --parsable --export=ALL --kill-on-invalid-dep=yes \\
+        --dependency="afternotok:$SLURM_JOB_ID" "$0")
 fi
 {before}\
 if [ -f "$out/run.h5" ]; then
@@ -152,9 +163,13 @@ else
     srun catenary run {words} -o "$out"{petsc}
 fi
 code=$?
-# The next job is for a run that was interrupted or killed; others would end the same way again.
-interrupted() {{ [ "$code" -ge 128 ] || grep -qs '"outcome": "interrupted"' "$out/summary.json"; }}
-if [ -n "$next" ] && ! interrupted; then
+# The next job is for a run that was interrupted or killed. Others would end the same way again: bad
+# input, a run that never began, or one that broke.
+broken() {{
+    [ ! -f "$out/run.h5" ] ||
+        grep -s '"outcome": ' "$out/summary.json" | grep -qv '"interrupted"'
+}}
+if [ -n "$next" ] && [ "$code" -lt 128 ] && {{ [ "$code" -eq 2 ] || broken; }}; then
     scancel "$next"
 fi
 exit "$code"
@@ -189,7 +204,7 @@ def array_script(
         raise InputError(f"--array is {n_tasks}, more than the {needs.n_runs} runs")
     total, longest = needs.march
     march = max(longest, total / n_tasks / job.ranks)
-    options = directives_of(job, out, march, needs.memory * job.ranks)
+    options = directives_of(job, out, march, needs.memory * job.a_node)
     return _ARRAY_SCRIPT.format(
         options="\n".join([f"#SBATCH --array=1-{n_tasks}", "#SBATCH --requeue", *options]),
         before="".join(f"{line}\n" for line in job.before),

@@ -16,6 +16,7 @@ from catenary.postproc.evaluate import filters
 from catenary.postproc.files.hdf5 import table_rows
 from catenary.postproc.files.kept_extremes import store_extremes
 from catenary.postproc.files.run_schema import COMPLETE
+from catenary.postproc.read import records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import envelope
 
@@ -136,3 +137,38 @@ def test_a_report_on_a_long_run_takes_bounded_memory(
     print(f"resident {resident / 1e6:.0f} MB")
     assert resident < 400e6
     assert (tmp_path / "report.html").stat().st_size > 100_000
+
+
+class Read:
+    """A table that counts the values that are read from it."""
+
+    def __init__(self, table: h5py.Dataset) -> None:
+        self._table, self.n_values = table, 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._table, name)
+
+    def __getitem__(self, part: Any) -> np.ndarray:
+        values: np.ndarray = self._table[part]
+        self.n_values += values.size
+        return values
+
+
+@pytest.mark.parametrize("compression", [None, "gzip"])
+def test_what_a_window_left_unwritten_is_not_read(compression: str | None, tmp_path: Path) -> None:
+    """A band of columns moves along a table, whose other chunks are not in the file."""
+    n_rows, n_columns, band = 2000, 4000, 40
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        table = file.create_dataset(
+            "dropper_force", (n_rows, n_columns), "f8", chunks=(100, 64), compression=compression,
+            fillvalue=np.nan,
+        )  # fmt: skip
+        for row in range(n_rows):
+            table[row, row : row + band] = float(row)
+        counted = Read(table)
+        assert records.valid_rows(counted, n_rows, 1e6, True) == n_rows
+        # Blocks of a few hundred columns that meet the band, of a table that takes 64 MB.
+        assert 0 < counted.n_values < 0.6 * n_rows * n_columns
+        assert records.valid_rows(table, n_rows, 1e6, False) == 0, "NaN where none may be"
+        table[1500, 3900] = 1e7
+        assert records.valid_rows(table, n_rows, 1e6, True) == 1500
