@@ -123,6 +123,7 @@ def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
     yield from _idle_arms(scene)
     yield from _idle_clamps(scene)
     yield from _lateral_places(scene)
+    yield from _places_of_free_lines(scene)
     yield from _dropper_lengths(scene, line)
     yield from _random(scene)
     yield from _sagging(scene)
@@ -178,6 +179,26 @@ def _lateral_places(scene: Scene) -> Iterator[Fault]:
             continue
         for name in set(idle) & wire.model_fields_set:
             yield scene.refused(f"line.wires.{i}.{name}", why + take_away())
+
+
+def _places_of_free_lines(scene: Scene) -> Iterator[Fault]:
+    """Heights and staggers of a whole free line whose wires all have their own."""
+    wires = scene.line.wires or []
+    names = {wire.name for wire in wires}
+    placed = [wire for wire in wires if wire.course_m is None]
+    contact = [wire for wire in placed if wire.role == "contact"]
+    others = [wire for wire in placed if wire not in contact and not {wire.start, wire.end} & names]
+    reads = {
+        "contact_height_m": any(wire.height_m is None for wire in contact),
+        "stagger_m": any(wire.stagger_m is None for wire in contact),
+        "messenger_stagger_m": any(wire.stagger_m is None for wire in others),
+    }
+    for name, read in reads.items():
+        if wires and not read and name in scene.line.model_fields_set:
+            own = name.removeprefix("contact_").removeprefix("messenger_")
+            which = "other" if name == "messenger_stagger_m" else "contact"
+            why = f"nothing reads it: {which} wires have places of their own ({own} or course_m)"
+            yield scene.refused(f"line.{name}", why + take_away())
 
 
 def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:

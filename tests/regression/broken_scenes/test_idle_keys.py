@@ -62,6 +62,25 @@ IDLE = {
         ["line.wires.4.clamp_stiffness_N_per_m=1e6"],
         "high_messenger has no clamp: neither start nor end names a wire",
     ),
+    "height of a line whose contact wires have their own": (
+        FREE,
+        ["line.wires.0.height_m=5.2"],
+        "line.contact_height_m is 5.3 m in ",
+    ),
+    "stagger of a line whose contact wires have their own": (
+        FREE,
+        ["line.wires.0.stagger_m=0.1"],
+        "nothing reads it: contact wires have places of their own (stagger_m or course_m)",
+    ),
+    "stagger of messenger wires that have their own": (
+        FREE,
+        [
+            "line.messenger_stagger_m=0.3",
+            "line.wires.3.stagger_m=0.1",
+            "effects.lateral_motion=true",
+        ],
+        "line.messenger_stagger_m is [0.3] m on the command line (--set); nothing reads it",
+    ),
     "stagger of a wire between clamps": (
         FREE,
         ["line.wires.1.stagger_m=0.1"],
