@@ -27,7 +27,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.wires import Role, Wire
+from catenary.meshgen.wires import End, Piece, Role, Wire
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.effect import Limit
 
@@ -118,6 +118,17 @@ def _place(scene: Scene, wire: Wire, key: str, x: float) -> Iterator[Fault]:
         pieces = [f"{piece.x[0]:g} to {piece.x[-1]:g} m" for piece in wire.pieces]
         more = " and so on" if len(pieces) > 3 else ""
         yield scene.refused(key, f"{wire.name} runs from {', '.join(pieces[:3])}{more}")
+        return
+    ends = [place for piece in wire.pieces for place in _held_ends(piece)]
+    periodic = "periodic" in (scene.line.ends.start.kind, scene.line.ends.end.kind)
+    if not periodic and any(abs(place - x) < _TINY for place in ends):
+        yield scene.refused(key, f"{wire.name} ends there, where it is held and nothing moves it")
+
+
+def _held_ends(piece: Piece) -> list[float]:
+    """Places where a piece ends without a clamp to another wire [m]."""
+    ends = zip((piece.x[0], piece.x[-1]), piece.ends, strict=True)
+    return [place for place, end in ends if end is not End.CLAMPED]
 
 
 def _is_at(wire: Wire, x: float) -> bool:

@@ -131,6 +131,8 @@ ASSIGNMENTS = {
     "a metre too long": ([f"{LENGTHS}.by_dropper=[[7,1,1000]]"], "must have errors within 500 mm"),
     "lengths of nothing": ([f"{LENGTHS}.by_dropper="], "needs standard_deviation_mm or by_dropper"),
     "no such fitting": (["line.fittings.0.kind=lamp"], "must be section_insulator"),
+    "fitting at a fixed end": (["line.fittings.0.at_m=0"], "ends there, where it is held"),
+    "spot at a fixed end": (["defects.4.at_m=1320"], "contact_wire ends there, where it is held"),
     "fitting beyond the line": (["line.fittings.0.at_m=1400"], "contact_wire runs from 0"),
     "fitting that sticks out": (
         ["line.fittings.0.at_m=1319"],
