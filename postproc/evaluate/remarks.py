@@ -13,6 +13,7 @@ from catenary.postproc.evaluate.statistics import slackens_at_all
 from catenary.postproc.evaluate.wording import counted, stiffness_words
 from catenary.postproc.read.results import Results
 from catenary.solver.effects.shipped.stiff_link_effects import STIFF
+from catenary.solver.problem.watched_links import HIGH_STOP, LOW_STOP
 
 # Share of a gust's load that linear drag may leave out.
 _LEFT_OUT = 0.15
@@ -70,6 +71,7 @@ def remarks(results: Results) -> list[str]:
         *_about_contact(results),
         *_about_droppers(results),
         *_about_ends(results),
+        *_about_stops(results),
         *_about_iterations(results),
         *_about_sizes(results),
         *_about_gusts(results),
@@ -193,6 +195,22 @@ def _about_ends(results: Results) -> list[str]:
                 f"{remedy}, or a larger line.n_spans."
             )
     return sentences
+
+
+def _about_stops(results: Results) -> list[str]:
+    """Remark on tensioners at their stops, at rest or under way."""
+    low, high = (results.extremes(name)[1] for name in (LOW_STOP, HIGH_STOP))
+    force = np.maximum(low, high)
+    stopped = np.flatnonzero(force > 0.0)  # not where it is not known, NaN
+    if stopped.size == 0:
+        return []
+    most = stopped[np.argmax(force[stopped])]
+    return [
+        f"{counted(stopped.size, 'tensioner')} met a stop, the one at "
+        f"{results.line('end_x')[most]:g} m with {1e-3 * force[most]:.3g} kN the most: its wire "
+        "has not the tension of its weights. `catenary static` prints tensions at rest; take a "
+        "larger line.tensioner.travel_m, or a shorter section."
+    ]
 
 
 def _about_contact(results: Results) -> list[str]:

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scenes import load_scene
 from verb_runner import invoke
 
 from catenary import InputError
+from catenary.cases.run.at_rest.static_table import check_line
 from catenary.cases.run.at_rest.temperatures import range_of, temperature_text
 from catenary.solver.model.wire_ends import WireEnd
 from catenary.solver.statics.tension_along import LineAtTemperature, WireAtRest
@@ -101,3 +103,15 @@ def test_limits_that_are_exceeded_are_named(share: float, remarks: int) -> None:
     assert text.count("contact_wire: at +30 K") == remarks
     assert "60 slack" in text
     assert ("are within 10 %" in text) == (remarks == 0)
+
+
+def test_a_check_tells_tensioners_at_their_stops() -> None:
+    """720 m of wire, 40 K warmer, would move its end by 0.49 m."""
+    warm = ["line.temperature.difference_K=40"]
+    free, stopped = (
+        check_line(load_scene("en50318_2002", [*SCENE, *warm, f"line.tensioner.travel_m={own}"]))
+        for own in (0.6, 0.3)
+    )
+    assert not any("stops" in text for text in free.warnings)
+    (told,) = (text for text in stopped.warnings if "stops" in text)
+    assert "At rest stops hold 2 of 2 tensioners, that of contact_wire at 720 m among them" in told

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.options import option
 from catenary.cases.run.at_rest.temperatures import temperatures
 from catenary.cases.run.describe.arrivals import arrival_facts
 from catenary.cases.run.describe.defects import defect_facts
@@ -26,7 +27,9 @@ from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.registration import Registration
 from catenary.solver.effects.all_effects import with_defects
+from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.model.wire_ends import at_stop, tensioned_ends
 from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
 from catenary.solver.statics.line_at_rest import line_at_rest, stable_form
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
@@ -135,7 +138,23 @@ def check_line(scene: Scene) -> Checked:
         f"ends: {'; '.join(waves['ends'])}",
         *(fact["says"] for fact in waves["pantographs"]),
     ]
-    return Checked(sentences, [*waves["warnings"], *([] if arms is None else arms.warnings())])
+    pushed = [] if arms is None else arms.warnings()
+    return Checked(sentences, [*waves["warnings"], *pushed, *_at_stops(model)])
+
+
+def _at_stops(model: Model) -> list[str]:
+    """A sentence if stops hold tensioners at rest, none if not."""
+    ends = tensioned_ends(model)
+    stopped = [end for end in ends if at_stop(model, end)]
+    if not stopped:
+        return []
+    first = stopped[0]
+    return [
+        f"At rest stops hold {len(stopped)} of {counted(len(ends), 'tensioner')}, that of "
+        f"{first.wire} at {model.mesh.points[first.node, 0]:g} m among them: these wires have not "
+        f"the tension of their weights, see {option('`catenary static`', 'catenary.static')}. Take "
+        "a larger line.tensioner.travel_m, or a shorter section."
+    ]
 
 
 def write_static(path: Path, table: Mapping[str, Any], registration: bool = False) -> None:

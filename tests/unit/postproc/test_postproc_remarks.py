@@ -29,9 +29,17 @@ class Told:
             "touching_mass": np.full(2, mass),
             "contact_stiffness": np.full(2, stiffness),
         } | facts
+        self.stops: dict[str, list[float]] = {}
 
     def has(self, name: str) -> bool:
         return False
+
+    def extremes(self, name: str) -> np.ndarray:
+        largest = self.stops.get(name, [])
+        return np.array([[0.0] * len(largest), largest])
+
+    def line(self, name: str) -> np.ndarray:
+        return np.array({"end_x": [0.0, 550.0, 1100.0]}[name])
 
     def fact(self, name: str) -> float:
         return float(self.facts[name])
@@ -108,6 +116,17 @@ def test_steps_above_their_tolerance_are_told() -> None:
     assert "7 of 900 steps" in sentence and "numerics.adaptive_tolerance_N = 0.5," in sentence
 
 
+def test_tensioners_that_met_a_stop_are_told() -> None:
+    told = Told(7.2, 1e-3, 1e6)
+    told.stops = {"tensioner_low_stop": [0.0, 0.0, 0.0], "tensioner_high_stop": [0.0, 0.0, 0.0]}
+    assert remarks(told) == []  # type: ignore[arg-type]
+    told.stops["tensioner_low_stop"] = [900.0, 0.0, 1234.0]
+    (sentence,) = remarks(told)  # type: ignore[arg-type]
+    assert "2 tensioners met a stop, the one at 1100 m with 1.23 kN the most" in sentence
+    told.stops["tensioner_low_stop"] = [np.nan, np.nan, np.nan]
+    assert remarks(told) == []  # type: ignore[arg-type]
+
+
 def test_files_without_facts_have_no_remarks() -> None:
     told = Told(7.2, 1e-3, 1e7)
     told.facts = {name: value * np.nan for name, value in told.facts.items()}
@@ -165,7 +184,8 @@ class Ended(Told):
         return {"support_x": 50.0 * np.arange(5), "dropper_x": self._x}[name]
 
     def extremes(self, name: str) -> np.ndarray:
-        assert name == "dropper_force"
+        if name != "dropper_force":
+            return super().extremes(name)
         return np.array([self._lowest, self._lowest + 50.0])
 
 
