@@ -109,6 +109,8 @@ def write_case(
             sentence = str(error)
             for name, path in copied.items():
                 sentence = sentence.replace(str(inner / name), str(path))
+            if spans is not None and droppers is None and "line.dropper" in sentence:
+                sentence += ", or a planner's table by --droppers"
             raise InputError(sentence.replace(str(inner), str(folder))) from error
         inner.rename(folder)
     return folder / CASE_FILE
@@ -149,15 +151,16 @@ def starting_text(kind: str, name: str, spans: Sequence[float] = (), droppers: b
         raise InputError(f"{path} has no table [line] to begin with")
     if spans:
         body = _with_files(body, spans, droppers)
+    origin = path.parent.name if path.name == CASE_FILE else path.stem
     head = (
-        f"# {plain(name)}: a new case, begun from {path.parent.name}. Change what differs\n"
+        f"# {plain(name)}: a new case, begun from {origin}. Change what differs\n"
         "# on your line. `catenary list --keys WORD` explains keys.\n"
         '# Behind "usual" stands what other lines have, in the unit of the key.\n\n'
     )
     case = (
         f'[case]\ntitle = "{_quoted(name)}"\n'
-        f'description = "Begun from {_quoted(path.parent.name)}."\n'
-        f'source = "to be replaced; values of {_quoted(path.parent.name)}: {_quoted(source)}"\n\n'
+        f'description = "Begun from {_quoted(origin)}."\n'
+        f'source = "to be replaced; values of {_quoted(origin)}: {_quoted(source)}"\n\n'
     )
     return head + case + _with_usual_values(body)
 
@@ -191,6 +194,8 @@ def _with_files(body: str, spans: Sequence[float], droppers: bool) -> str:
     if n < least:
         raise InputError(f"a new case needs {least} spans to run in, judge and run out, not {n}")
     body = _edited(body, "line", {"n_spans": None, "span_m": None, "spans_file": f'"{SPANS_FILE}"'})
+    if "\n[line.transition]" in body:  # the file has their lengths, too
+        body = _edited(body, "line.transition", {"span_m": None})
     if droppers:
         own = dict.fromkeys(("positions_m", "pre_sag_mm", "pre_sag_mid_mm", "count", "spacing_m"))
         body = _edited(body, "line.dropper", {**own, "patterns_file": f'"{DROPPERS_FILE}"'})

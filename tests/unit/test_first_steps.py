@@ -126,6 +126,21 @@ def test_a_case_of_ones_own_may_be_a_beginning(tmp_path: Path) -> None:
     assert load_scene(again).line == scene.line
 
 
+def test_spans_of_a_table_are_those_of_transitions_too(tmp_path: Path) -> None:
+    """Of ``ambrosio2012`` the end spans have a length of their own."""
+    spans, droppers = tables(tmp_path, 20)
+    scene = load_scene(write_case(tmp_path / "a", "ambrosio2012", spans, droppers))
+    assert scene.line.transition.n_spans_start > 0
+    lengths = tuple(map(float, spans.read_text().splitlines()[1:]))
+    assert line_data_of(scene).span_lengths == lengths
+
+
+def test_a_case_of_another_file_is_named_by_it(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "docs/examples/two_messengers.toml"
+    text = write_case(tmp_path / "a", str(example)).read_text()
+    assert "begun from two_messengers." in text and "values of two_messengers: assumed" in text
+
+
 def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
     spans, _ = tables(tmp_path, 20)
     assert load_scene(write_case(tmp_path / "a", "tramway", spans)).line.n_spans == 20
@@ -138,7 +153,7 @@ def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
         (["--droppers", "hung.csv"], "--droppers needs --spans too"),
         (["--spans", "none.csv"], "none.csv cannot be read: no such file"),
         (["--spans", "few.csv", "--droppers", "hung.csv"], "a new case needs 12 spans"),
-        (["--spans", "line 7.csv"], "line.dropper.positions_m"),
+        (["--spans", "line 7.csv"], "spacing_m, or a planner's table by --droppers"),
         (["--spans", "hung.csv"], "the table of spans is"),
         (["--spans", "line 7.csv", "--droppers", "typed.csv"], "droppers is typed.csv; its line 5"),
         (
