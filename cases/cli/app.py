@@ -301,6 +301,28 @@ def lone_task(n_ranks: int) -> str:
     )
 
 
+def crowded(comm: Any) -> str:
+    """The sentence for ranks that have fewer cores on the machine of rank 0 than they are.
+
+    "" for all others. Collective.
+    """
+    if comm.size == 1 or not hasattr(os, "sched_getaffinity"):  # the latter: not Linux
+        return ""
+    from catenary.base.mpi import MPI
+    from catenary.postproc.evaluate.wording import counted
+
+    here = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    n_ranks, n_cores = here.size, len(set().union(*here.allgather(os.sched_getaffinity(0))))
+    here.Free()
+    if n_ranks <= n_cores:
+        return ""
+    return (
+        f"{n_ranks} ranks share {counted(n_cores, 'core')} of this machine: in every step each "
+        "waits for the others' turns on a core, which takes many times as long as the step; start "
+        "no more ranks than there are cores"
+    )
+
+
 def begin(
     read: Callable[[], tuple[T, list[str]]], verbose: bool, scene_of: Callable[[T], Scene]
 ) -> tuple[Any, T, list[str]]:

@@ -23,6 +23,7 @@ from catenary.cases.cli.app import (
     Vary,
     Verbose,
     begin,
+    crowded,
     serial_verb,
     verb,
 )
@@ -75,8 +76,13 @@ def run(
     comm, scene, arguments = begin(read, runs.verbose, lambda scene: scene)
     from catenary.cases.run.describe.arrivals import arrival_warnings
     from catenary.runs import run_into
+    from catenary.solver.problem.problem import OFF
+
+    crowd = crowded(comm)
 
     def warn() -> None:
+        if crowd and scene.window.mode == OFF:  # else one rank computes, and says so
+            console.warn(crowd)
         for text in arrival_warnings(scene):
             console.warn(text)
 
@@ -131,7 +137,10 @@ def restart(
 
     comm, scene, arguments = begin(read, verbose, lambda scene: scene)
     from catenary.runs import go_on
+    from catenary.solver.problem.problem import OFF
 
+    if (crowd := crowded(comm)) and scene.window.mode == OFF:
+        console.warn(crowd)
     made = go_on(
         folder,
         scene,
