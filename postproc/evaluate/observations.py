@@ -291,12 +291,13 @@ def _dropper_slackenings(run: ObservedRun) -> Observation:
     if not results.has("dropper_force") or not results.line_record.whole:
         return Observation(absent="the forces of droppers are not recorded in every step")
     begun = np.zeros(evaluated.size, dtype=np.int64)
-    was = np.zeros(evaluated.size, dtype=bool)
-    for _, force in results.blocks("dropper_force"):
+    was, until = np.zeros(0, dtype=bool), (-1, -1)
+    for part, columns, force in results.written_blocks("dropper_force"):
         slack = force <= 0.0
-        before = np.vstack([was, slack[:-1]])
-        begun += (slack & ~before).sum(axis=0)
-        was = slack[-1]
+        if (columns[0], part.start) != until:  # the first rows, or the first after unwritten ones
+            was = np.zeros(columns.size, dtype=bool)
+        begun[columns] += (slack & ~np.vstack([was, slack[:-1]])).sum(axis=0)
+        was, until = slack[-1], (columns[0], part.stop)
     return _one(float(begun[evaluated].max()))
 
 

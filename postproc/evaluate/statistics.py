@@ -352,6 +352,6 @@ def slack_times(results: Results) -> np.ndarray:
     times = np.full(n_droppers, np.nan)
     times[results.recorded_columns("dropper_force")] = 0.0
     interval = results.line_record.every * results.dt
-    for _, force in results.blocks("dropper_force"):
-        times += interval * np.count_nonzero(force <= 0.0, axis=0)
+    for _, columns, force in results.written_blocks("dropper_force"):
+        times[columns] += interval * np.count_nonzero(force <= 0.0, axis=0)
     return times

@@ -10,7 +10,7 @@ import numpy as np
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.committed_rows import committed_rows
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
-from catenary.postproc.files.hdf5.table_rows import row_blocks
+from catenary.postproc.files.hdf5.table_rows import COLUMNS_AT_ONCE, row_blocks, unwritten
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     CLOCKS,
@@ -24,8 +24,6 @@ from catenary.solver.time_loop.views.channels import RUN, Channel
 
 # A time may be this share of a step off its place.
 _OFF = 1e-3
-# Columns of a wide table that are read at once.
-_COLUMNS = 256
 
 
 class Records(NamedTuple):
@@ -159,7 +157,7 @@ def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) 
     n_columns = int(np.prod(table.shape[1:]))
     chunk, start = table.chunks[0] if table.chunks else 1, 0
     try:
-        for part in row_blocks(n_rows, min(n_columns, _COLUMNS), chunk):
+        for part in row_blocks(n_rows, min(n_columns, COLUMNS_AT_ONCE), chunk):
             start = part.start
             bad = _invalid(table, part, n_columns, most, may_be_nan)
             if bad.any():
@@ -183,9 +181,9 @@ def _invalid(
 ) -> np.ndarray:
     """Mask of rows with impossible values, (rows,) bool."""
     bad = np.zeros(part.stop - part.start, dtype=bool)
-    for first in range(0, n_columns, _COLUMNS):
-        columns = (slice(first, first + _COLUMNS),) if table.ndim == 2 else ()
-        if may_be_nan and columns and _unwritten(table, part, columns[0]):
+    for first in range(0, n_columns, COLUMNS_AT_ONCE):
+        columns = (slice(first, first + COLUMNS_AT_ONCE),) if table.ndim == 2 else ()
+        if may_be_nan and columns and unwritten(table, part, columns[0]):
             continue
         values = np.asarray(table[(part, *columns)]).reshape(bad.size, -1)
         # Not true of NaN. As good as all blocks are valid, and this makes no arrays.
@@ -195,30 +193,6 @@ def _invalid(
             valid = np.abs(values) <= most
         bad |= ~(valid | np.isnan(values) if may_be_nan else valid).all(axis=1)
     return bad
-
-
-def _unwritten(table: h5py.Dataset, part: slice, columns: slice) -> bool:
-    """Whether part of a table reads as NaN because none of its chunks was ever written.
-
-    With a window those are most of a long line, and HDF5 takes longer to fill them than it marched.
-    """
-    if not table.chunks or not np.isnan(table.fillvalue):
-        return False
-    down, across = table.chunks
-    last = min(columns.stop, table.shape[1])
-    return not any(
-        _is_written(table, (row, column))
-        for row in range(part.start - part.start % down, part.stop, down)
-        for column in range(columns.start - columns.start % across, last, across)
-    )
-
-
-def _is_written(table: h5py.Dataset, corner: tuple[int, int]) -> bool:
-    """Whether the chunk at a corner is in the file; of one that cannot be read that is supposed."""
-    try:
-        return len(table.id.read_direct_chunk(corner)[1]) > 0
-    except HDF5_ERRORS as error:
-        return "not allocated" not in str(error)
 
 
 def _in_order(table: h5py.Dataset, n: int, dt: float | None) -> int:

@@ -220,6 +220,23 @@ class Results(TrainOfRun):
         for part in table_rows.row_blocks(self.n_rows(name), self._n_places(name), step):
             yield part, self.rows(name, part)
 
+    def written_blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+        """The valid values of a channel by blocks of a few columns, whose rows come in order: which
+        rows, numbers of the columns (c,), and values (rows, c).
+
+        Without those blocks that a window left unwritten, which are NaN.
+        """
+        table = self._table(name)
+        if table is None:
+            return
+        numbers = self.recorded_columns(name)
+        valid, step = self._valid(name, slice(0, self.n_rows(name))), (table.chunks or (1,))[0]
+        for first in range(0, numbers.size, table_rows.COLUMNS_AT_ONCE):
+            columns = slice(first, min(first + table_rows.COLUMNS_AT_ONCE, numbers.size))
+            for part in table_rows.row_blocks(valid.stop, columns.stop - first, step):
+                if not table_rows.unwritten(table, part, columns):
+                    yield part, numbers[columns], np.asarray(table[part, columns])
+
     def recorded_columns(self, name: str) -> np.ndarray:
         """Columns of a channel that its table has, (n,) int; all but of arms and droppers beyond
         the recorded stretch."""

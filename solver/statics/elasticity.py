@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +20,8 @@ from catenary.solver.model.operator_bands import OperatorBands
 
 # Length of line to both sides of a stretch in the first solution [m], and motion that is none.
 _FIRST_REACH, _STILL = 1500.0, 1e-13
+# Longest part of a stretch, whose places are solved for one by one in all of it [m].
+_LONGEST = 300.0
 # Places closer than this along the track are one [m].
 _SAME_PLACE = 1e-6
 # Numbers of solutions that are held at once.
@@ -78,8 +81,8 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
 
     Droppers taut, arms included. The line outside is condensed to the unknowns that it is joined
     to; then there is a small solve for each place. Of a long line that is as much of it as moves by
-    more than round-off. Each wire gives way by itself, also one that moves with another. Not
-    collective.
+    more than round-off, and a long stretch is taken in parts. Each wire gives way by itself, also
+    one that moves with another. Not collective.
 
     Raises
     ------
@@ -87,6 +90,15 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
         If the line is unstable.
     """
     model = with_wires_apart(model)
+    cuts = np.linspace(x_from, x_to, 1 + max(1, math.ceil((x_to - x_from) / _LONGEST)))
+    parts = [_of_stretch(model, *ends) for ends in itertools.pairwise(cuts.tolist())]
+    x = np.concatenate([part.x for part in parts])
+    once = np.diff(x, prepend=-np.inf) > _SAME_PLACE  # a node at a cut is in both parts
+    return Elasticity(x[once], np.concatenate([part.compliance for part in parts])[once])
+
+
+def _of_stretch(model: Model, x_from: float, x_to: float) -> Elasticity:
+    """The lift in a stretch that is solved as a whole."""
     chains = model.nodes_of(Role.CONTACT)
     if len(chains) == 1:
         x = model.mesh.x(chains[0])

@@ -107,3 +107,16 @@ def test_a_long_line_is_looked_at_as_far_as_it_moves(monkeypatch: pytest.MonkeyP
     found = elasticity(model, *stretch).lift
     assert len(looked) > 1 and looked[0] < looked[-1] <= model.n_dofs
     check("lift [m/N]", found, whole, within=1e-12 * whole.max())
+
+
+def test_a_long_stretch_is_solved_in_parts_with_each_place_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    line = ac_simple_line(12)
+    model, _ = find_form(problem_of(line, HANGING), mesh_of(line, 2))
+    monkeypatch.setattr(lifts, "_LONGEST", 1e9)
+    whole = elasticity(model, 55.0, 605.0)
+    monkeypatch.setattr(lifts, "_LONGEST", 55.0)  # cuts at masts, where nodes are
+    found = elasticity(model, 55.0, 605.0)
+    np.testing.assert_array_equal(found.x, whole.x)
+    check("lift [m/N]", found.lift, whole.lift, within=1e-12 * whole.lift.max())

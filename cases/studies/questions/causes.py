@@ -311,9 +311,10 @@ class Causes:
         if self._rest is None:
             return {}
         when = []
+        numbers = {one.pantograph for one in self._passages}
+        positions = {p: self._results.column("contact_position", p) for p in numbers}
         for one in self._passages:
-            position = self._results.column("contact_position", one.pantograph)
-            rows = np.searchsorted(position, (one.start, one.end)).tolist()
+            rows = np.searchsorted(positions[one.pantograph], (one.start, one.end)).tolist()
             come, gone = map(self._results.time_at, rows)
             when.append((one.start, one.end, come - _BEFORE, gone))
         found: dict[int, dict[int, float]] = {}

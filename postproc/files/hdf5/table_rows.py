@@ -11,6 +11,8 @@ import h5py
 import numpy as np
 from h5py import h5s
 
+from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
+
 _NO_FILTER = 0xFFFFFFFF
 
 
@@ -121,6 +123,8 @@ def _mend_end(table: h5py.Dataset, rows: int) -> int:
 
 # Largest size of a block of rows [B].
 BLOCK_BYTES = 16e6
+# Columns of a wide table that are read at once.
+COLUMNS_AT_ONCE = 256
 # Rows of a column that are read at once.
 _SLICE = 1 << 18
 
@@ -141,6 +145,30 @@ def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:
     rows = max(step, rows - rows % step)
     for start in range(0, n_rows, rows):
         yield slice(start, min(start + rows, n_rows))
+
+
+def unwritten(dataset: h5py.Dataset, part: slice, columns: slice) -> bool:
+    """Whether part of a table reads as NaN because none of its chunks was ever written.
+
+    With a window those are most of a long line, and HDF5 takes longer to fill them than it marched.
+    """
+    if not dataset.chunks or not np.isnan(dataset.fillvalue):
+        return False
+    down, across = dataset.chunks
+    last = min(columns.stop, dataset.shape[1])
+    return not any(
+        _is_written(dataset, (row, column))
+        for row in range(part.start - part.start % down, part.stop, down)
+        for column in range(columns.start - columns.start % across, last, across)
+    )
+
+
+def _is_written(dataset: h5py.Dataset, corner: tuple[int, int]) -> bool:
+    """Whether the chunk at a corner is in the file; of one that cannot be read that is supposed."""
+    try:
+        return len(dataset.id.read_direct_chunk(corner)[1]) > 0
+    except HDF5_ERRORS as error:
+        return "not allocated" not in str(error)
 
 
 def column(dataset: h5py.Dataset, part: slice, index: int) -> np.ndarray:

@@ -124,7 +124,7 @@ def _side_view(
     for nodes, marker in ((mesh.steady_arms, "<"), (mesh.supports, "^")):
         axes.plot(points[nodes, 0], points[nodes, 2], marker, color=GREY, ms=4, ls="none")
     factor = _to_scale(axes, points, stretch, 2, _SIDE)
-    _masts(axes, line)
+    _masts(axes, line, stretch)
     axes.set_ylabel("height above rail [m]")
     axes.set_title(f"{line.topology}: side view, heights {_times(factor)}", loc="left", fontsize=10)
 
@@ -143,7 +143,7 @@ def _plan_view(
     axes.axhline(0.0, color=GREY, lw=0.5, ls="--")
     _wires(axes, line, mesh, points, 1)
     factor = _to_scale(axes, points, stretch, 1, _PLAN, reach)
-    _masts(axes, line)
+    _masts(axes, line, stretch)
     axes.set_xlabel("position along the track [m]")
     axes.set_ylabel("to the left [m]")
     width = "" if half_head is None else "; shaded: working length of the pan head"
@@ -223,9 +223,10 @@ def _marks(axes: Axes, mesh: LineMesh, points: np.ndarray, marks: Sequence[Mark]
             )
 
 
-def _masts(axes: Axes, line: Line) -> None:
-    for x in line.support_positions:
-        axes.axvline(float(x), color=LIGHT, lw=0.8, zorder=0)
+def _masts(axes: Axes, line: Line, stretch: tuple[float, float]) -> None:
+    for x in line.support_positions.tolist():
+        if stretch[0] <= x <= stretch[1]:
+            axes.axvline(x, color=LIGHT, lw=0.8, zorder=0)
 
 
 def _to_scale(

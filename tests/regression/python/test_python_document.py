@@ -42,7 +42,9 @@ def test_the_page_of_the_interface(
     session, longer, steps, states, ranks = run_all(programs(DOCS / "python.md"), {}, capsys)
     assert re.fullmatch(r"\d+\.\d+ True\n", session)
     # The last step ends within its way, 0.08 m, of the later end.
-    assert 9.9 < float(longer) < 10.1
+    later, shape = longer.splitlines()
+    assert 9.9 < float(later) < 10.1
+    assert re.fullmatch(r"\(\d+, 1\)", shape)
     assert steps.startswith("5.0 ") or steps.startswith("4.99")
     gains = [float(word) for word in re.findall(r"sigma (\S+) N", states)]
     assert len(gains) == 3 and len(set(gains)) == 3

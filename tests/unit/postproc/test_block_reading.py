@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
+import catenary
 from catenary.postproc.evaluate import filters
+from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.files.hdf5 import table_rows
 from catenary.postproc.files.kept_extremes import store_extremes
 from catenary.postproc.files.run_schema import COMPLETE
@@ -172,3 +174,30 @@ def test_what_a_window_left_unwritten_is_not_read(compression: str | None, tmp_p
         assert records.valid_rows(table, n_rows, 1e6, False) == 0, "NaN where none may be"
         table[1500, 3900] = 1e7
         assert records.valid_rows(table, n_rows, 1e6, True) == 1500
+
+
+def test_written_blocks_hold_all_that_a_window_wrote(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are the whole table but for blocks that are NaN."""
+    monkeypatch.setattr(table_rows, "COLUMNS_AT_ONCE", 64)
+    monkeypatch.setattr(table_rows, "BLOCK_BYTES", 5e5)
+    folder = tmp_path / "run"
+    catenary.run(
+        catenary.load("ambrosio2012").replace(
+            line={"n_spans": 40}, window={"mode": "bounded"},
+            train={"start_m": 300.0, "end_m": 1700.0}, evaluation={"from_m": 700.0, "to_m": 1400.0},
+        ),
+        folder,
+        report=False,
+    )  # fmt: skip
+    with Results(folder) as results:
+        whole = results.channel("dropper_force")
+        found, n_values = np.full(whole.shape, np.nan), 0
+        for part, columns, values in results.written_blocks("dropper_force"):
+            found[part, columns] = values
+            n_values += values.size
+        np.testing.assert_array_equal(found, whole)
+        slack = np.count_nonzero(whole <= 0.0, axis=0) * results.dt
+        np.testing.assert_allclose(slack_times(results), slack, rtol=1e-12)
+    assert n_values < 0.8 * whole.size
