@@ -20,14 +20,12 @@ def name_of(requirement: str) -> str:
 
 
 def main() -> None:
-    """Print one requirement a line: those to ``build`` with, or ``all``, with those of the program,
-    films, tables, reports, site and tests."""
-    with open("pyproject.toml", "rb") as file:
+    """Print one requirement a line: build, program, films, tables, reports, site and tests."""
+    with open(sys.argv[1], "rb") as file:
         settings = tomllib.load(file)
     project = settings["project"]
-    build = settings["build-system"]["requires"]
     wanted = [
-        *build,
+        *settings["build-system"]["requires"],
         *(r for r in project["dependencies"] if name_of(r) not in FROM_SYSTEM),
         *(
             one
@@ -35,7 +33,7 @@ def main() -> None:
             for one in project["optional-dependencies"][extra]
         ),
     ]
-    print("\n".join(build if sys.argv[1] == "build" else wanted))
+    print("\n".join(wanted))
 
 
 main()

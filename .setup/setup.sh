@@ -50,14 +50,12 @@ finish() {
     say "setup:   $((SECONDS - step_begin)) s"
 }
 
-# Files to remove, and processes to end, however this script ends.
-work=$(mktemp -d)
+# Files to remove, and the ticker to end, however this script ends.
+work=
 ticker=
-compiler=
 clean_up() {
     [ -z "$ticker" ] || kill -KILL "$ticker" 2>/dev/null || true
-    [ -z "$compiler" ] || kill -- -"$compiler" 2>/dev/null || true
-    rm -rf "$work"
+    [ -z "$work" ] || rm -rf "$work"
 }
 trap clean_up EXIT
 trap 'exit 130' INT # pip catches it, and would pass for one that lacks a version
@@ -245,26 +243,36 @@ pip_install() {
         --no-compile "$@" >&2
 }
 
-# setup.py compiles what changed, and keeps its objects in build/kernels. What it says goes to a file,
-# which is shown when something is wrong.
+# setup.py compiles what changed, and keeps its objects in build/kernels.
 compile_kernels() {
-    local from log=$work/kernels.log
+    local output from
     from=$(fingerprint_of_kernels)
-    env -u PYTHONPATH .venv/bin/python -I setup.py --quiet build_ext --inplace >"$log" 2>&1 </dev/null || {
-        cat "$log" >&2
+    begin "compiling the kernels" "${1-}"
+    output=$(env -u PYTHONPATH .venv/bin/python -I setup.py --quiet build_ext --inplace 2>&1 </dev/null) || {
+        say "$output"
         fail "the kernels could not be compiled. They need a C++20 compiler (GCC 12 or newer," \
             "Clang 16 or newer; CXX=... names another than the usual one) and the headers of Python."
     }
-    ! grep -q warning: "$log" || cat "$log" >&2
+    [[ $output != *warning:* ]] || say "$output"
+    finish
     printf '%s\n' "$from" >"$KERNELS_STAMP"
 }
 
-# install_required FILE: install its requirements in the tested versions, or as pyproject.toml allows.
-install_required() {
+install_python_packages() {
     local tested
-    local -a wanted=(--requirement "$1" --constraint "$work/system.txt")
+    work=$(mktemp -d)
+    .venv/bin/python -I .setup/requirements.py pyproject.toml >"$work/requirements.txt"
+    # petsc4py and h5py are compiled against the system's numpy: nothing may bring another one.
+    .venv/bin/python -I - >"$work/system.txt" <<'CODE'
+import numpy
+import scipy
+
+print(f"numpy=={numpy.__version__}\nscipy=={scipy.__version__}")
+CODE
+    local -a wanted=(--requirement "$work/requirements.txt" --constraint "$work/system.txt")
     tested=.setup/tested/$(.venv/bin/python -I -c \
         'import sys; print("python{}.{}.txt".format(*sys.version_info))')
+    begin "installing Python packages into .venv" "1.2 GB, some 60 s"
     if [ "$newest" ]; then
         pip_install --upgrade --upgrade-strategy eager "${wanted[@]}"
     elif [ -f "$tested" ]; then
@@ -275,36 +283,13 @@ install_required() {
     else
         pip_install "${wanted[@]}"
     fi
-}
-
-# The kernels are compiled while packages are fetched and laid down, which takes one core at most.
-install_python_packages() {
-    .venv/bin/python -I .setup/requirements.py build >"$work/build.txt"
-    .venv/bin/python -I .setup/requirements.py all >"$work/all.txt"
-    # petsc4py and h5py are compiled against the system's numpy: nothing may bring another one.
-    .venv/bin/python -I - >"$work/system.txt" <<'CODE'
-import numpy
-import scipy
-
-print(f"numpy=={numpy.__version__}\nscipy=={scipy.__version__}")
-CODE
-    begin "installing Python packages into .venv, and compiling the kernels meanwhile" "1.2 GB, some 60 s"
-    install_required "$work/build.txt"
-    set -m # a process group of its own, which clean_up can end
-    compile_kernels &
-    compiler=$!
-    set +m
-    install_required "$work/all.txt"
+    compile_kernels "some two minutes"
+    pip_install --no-deps --no-build-isolation --editable .
     begin "compiling the packages to bytecode"
     # Bytecode on all cores at once: pip makes it on one, which took a third of its time. Packages
     # may bring files that are no Python of this version.
     .venv/bin/python -I -m compileall -q -j 0 \
         "$(.venv/bin/python -I -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null || true
-    begin "compiling the kernels" "some two minutes in all"
-    wait "$compiler" || exit 1
-    compiler=
-    finish
-    pip_install --no-deps --no-build-isolation --editable .
     # -E: the program reads the environment's packages, not those of the user's PYTHONPATH. In the
     # second line the interpreter stands if its path is too long for the first.
     sed -i -E "1s|^(#!.*/python[0-9.]*)\$|\1 -E|; 2s|^('''exec' .*/python[^ ]*) |\1 -E |" \
@@ -318,11 +303,7 @@ case "${1-}" in
 *) fail "unknown option $1; there is --newest" ;;
 esac
 if [ ! "$newest" ] && is_current; then
-    if ! kernels_are_current; then
-        begin "compiling the kernels"
-        compile_kernels
-        finish
-    fi
+    kernels_are_current || compile_kernels
     exit 0
 fi
 say "setup: preparing .venv, which takes two to five minutes the first time"
