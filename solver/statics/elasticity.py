@@ -91,13 +91,14 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
     """
     model = with_wires_apart(model)
     cuts = np.linspace(x_from, x_to, 1 + max(1, math.ceil((x_to - x_from) / _LONGEST)))
-    parts = [_of_stretch(model, *ends) for ends in itertools.pairwise(cuts.tolist())]
+    stiffness = OperatorBands(model, (0.0, 1.0, 0.0))
+    parts = [_of_stretch(model, stiffness, *ends) for ends in itertools.pairwise(cuts.tolist())]
     x = np.concatenate([part.x for part in parts])
     once = np.diff(x, prepend=-np.inf) > _SAME_PLACE  # a node at a cut is in both parts
     return Elasticity(x[once], np.concatenate([part.compliance for part in parts])[once])
 
 
-def _of_stretch(model: Model, x_from: float, x_to: float) -> Elasticity:
+def _of_stretch(model: Model, stiffness: OperatorBands, x_from: float, x_to: float) -> Elasticity:
     """The lift in a stretch that is solved as a whole."""
     chains = model.nodes_of(Role.CONTACT)
     if len(chains) == 1:
@@ -112,7 +113,7 @@ def _of_stretch(model: Model, x_from: float, x_to: float) -> Elasticity:
         present = np.stack([_is_there(model, wire, x) for wire in wires], axis=1)
         x_from, x_to = _element_ends(model, x_from, x_to)
     try:
-        first, factor = _seen_from(model, x_from, x_to)
+        first, factor = _seen_from(model, stiffness, x_from, x_to)
     except linalg.LinAlgError as error:
         raise InputError(
             "the contact wires have no elasticity: the line at rest is unstable"
@@ -189,15 +190,16 @@ def _element_ends(model: Model, x_from: float, x_to: float) -> tuple[float, floa
     return float(min(low)), float(max(high))
 
 
-def _seen_from(model: Model, x_from: float, x_to: float) -> tuple[int, np.ndarray]:
+def _seen_from(
+    model: Model, stiffness: OperatorBands, x_from: float, x_to: float
+) -> tuple[int, np.ndarray]:
     """Stiffness of what stands in a stretch, all else eliminated: its first unknown, and lower
     bands of Cholesky's factor."""
     numbering, width, reach = model.numbering, model.numbering.width, _FIRST_REACH
     first, last = numbering.within(x_from, x_to)
-    stiffness = OperatorBands(model, (0.0, 1.0, 0.0))
     while True:
         low, high = numbering.within(x_from - reach, x_to + reach)
-        bands = stiffness.between(low, high)
+        bands = stiffness.between(low, high, numbering.size)
         # So wide that nothing before it is joined to anything behind it.
         more = len(bands)
         begin = first - more if first - low > 2 * more else low
