@@ -195,9 +195,7 @@ class MovingWindow:
         arrays = self.arrays
         first, last = float(arrays.contacts.min()), float(arrays.contacts.max()) + way
         masts, n = arrays.masts, arrays.low.size
-        spans = np.interp([first, last], masts, np.arange(masts.size))
-        spans += -arrays.spans_behind, arrays.spans_ahead
-        behind, ahead = np.interp(spans, np.arange(masts.size), masts)
+        spans, (behind, ahead) = self._spans_around(first, last)
         begin, end = 0, n
         if spans[0] > 0.0:
             begin = int(np.searchsorted(arrays.high, min(behind, first - arrays.margin)))
@@ -210,18 +208,26 @@ class MovingWindow:
         if not self._is_covered(begin - _AROUND, end + _AROUND):
             self._cover(begin, end)
 
+    def _spans_around(self, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+        """Ends of a window of spans around contacts from ``first`` to ``last`` [m]: as numbers of
+        spans, which may be beyond the line, and as places [m], (2,) each."""
+        arrays = self.arrays
+        masts, numbers = arrays.masts, np.arange(arrays.masts.size)
+        spans = np.interp([first, last], masts, numbers)
+        spans += -arrays.spans_behind, arrays.spans_ahead
+        return spans, np.interp(spans, numbers, masts)
+
     def first_of_spans(self, contacts: np.ndarray) -> int:
         """First station of a window of spans around ``contacts`` (n,) [m], which moves and has not
         been left behind; 0 where the motion decides."""
         arrays = self.arrays
         if arrays.by_motion > 0.0:
             return 0
-        masts, numbers = arrays.masts, np.arange(arrays.masts.size)
         last = float(contacts.min())
-        span = float(np.interp(last, masts, numbers)) - arrays.spans_behind
-        if span <= 0.0:
+        spans, places = self._spans_around(last, last)
+        if spans[0] <= 0.0:
             return 0
-        behind = min(float(np.interp(span, numbers, masts)), float(arrays.loaded[0]))
+        behind = min(float(places[0]), float(arrays.loaded[0]))
         return int(np.searchsorted(arrays.high, behind))
 
     def provide_rows(self, begin: int, end: int) -> None:
