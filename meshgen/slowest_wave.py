@@ -60,12 +60,18 @@ def slowest_wave_of(line: Line, wire: Wire, share: float = 1.0) -> float:
         return string
     ends = [x for piece in wire.pieces for x in (piece.x[0], piece.x[-1])]
     places = np.unique([*ends, *(x for group in groups for x in group.x)])
+    span = float(np.diff(places).max())
+    # On supports that give way or have mass no wave of two spans is faster than with its nodes at
+    # the supports. Where that one does not bend, the slowest does not either.
+    bound = wave_of_two_spans(tension, wire.bending_stiffness, wire.mass_per_length, span).phase
+    if not bends(bound, tension, wire.mass_per_length):
+        return string
     arms = [arms.kind for arms in line.steady_arms if arms.wire == wire.name]
     found = supported_wave(
         tension,
         wire.bending_stiffness,
         wire.mass_per_length,
-        float(np.diff(places).max()),
+        span,
         min(group.stiffness for group in groups),
         max((arm.mass_per_length * arm.length / 3 + arm.clamp_mass for arm in arms), default=0.0),
     )
