@@ -35,19 +35,22 @@ endif
 .DEFAULT_GOAL := help
 # The targets share .venv and two cores: one after the other, also under make -j.
 .NOTPARALLEL:
-.PHONY: help setup setup-newest update-versions run check test test-studies test-unit \
+.PHONY: help setup setup-tests setup-newest update-versions run check test test-studies test-unit \
     test-verification test-regression test-mpi test-ranks bench long-runs fuzz test-paraview test-readers docs sanitize aarch64 lint types mypy links format clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
-setup: ## install what is needed, system packages included; quick when all is there
+setup: ## install the program and what it needs, system packages included; quick when all is there
 	@PYTHONPATH="$(PYTHONPATH)" bash .setup/setup.sh
 
-setup-newest: ## the same with the newest packages that pyproject.toml allows; says what differs
+setup-tests: ## the same with what tests, lint and documentation need
+	@PYTHONPATH="$(PYTHONPATH)" bash .setup/setup.sh --tests
+
+setup-newest: ## all of that in the newest versions that pyproject.toml allows; says what differs
 	@PYTHONPATH="$(PYTHONPATH)" bash .setup/setup.sh --newest
 
-update-versions: ## write what is installed into .setup/tested, from where make setup takes it
+update-versions: setup-tests ## write what is installed into .setup/tested, from where make setup takes it
 	@.venv/bin/python -I .setup/versions.py write
 
 run: setup ## simulate the paper's case and write its report
@@ -59,38 +62,38 @@ BESIDE_LINT = @mkdir -p build; $(MAKE) --no-print-directory lint >build/lint.log
     trap 'kill $$lint' INT TERM; $(1); tested=$$?; wait $$lint; linted=$$?; cat build/lint.log; \
     [ $$tested = 0 ] && [ $$linted = 0 ]
 
-check: setup ## lint, and the unit tests that start no process; a good minute
+check: setup-tests ## lint, and the unit tests that start no process; a good minute
 	$(call BESIDE_LINT,$(PYTEST_SHARED) -q -m "not process and not study" tests/unit)
 
-test: setup ## lint and tests, also on several ranks
+test: setup-tests ## lint and tests, also on several ranks
 	$(call BESIDE_LINT,$(PYTEST_SHARED) -m "not study" tests/regression tests/verification tests/unit)
 	@$(MAKE) --no-print-directory test-mpi
 
-test-studies: setup ## whole studies: hard cases, stability, accuracy, waves, the paper's; random scenes; 2 ranks
+test-studies: setup-tests ## whole studies: hard cases, stability, accuracy, waves, the paper's; random scenes; 2 ranks
 	$(PYTEST_SHARED) -m "study and not long" tests/regression tests/verification tests/unit
 	timeout 1200 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -m "not study" tests/mpi
 	timeout 1200 mpirun -n 3 $(MPI_SHARED) $(MPI_PYTEST) -m study --ignore=tests/mpi/test_rank_counts.py tests/mpi
 
-test-unit: setup ## tests of single parts
+test-unit: setup-tests ## tests of single parts
 	$(PYTEST_SHARED) tests/unit
 
-test-verification: setup ## tests against closed-form and published solutions
+test-verification: setup-tests ## tests against closed-form and published solutions
 	$(PYTEST_SHARED) tests/verification
 
-test-regression: setup ## every case, shortened, against published ranges
+test-regression: setup-tests ## every case, shortened, against published ranges
 	$(PYTEST_SHARED) tests/regression
 
-test-mpi: setup ## the same answers on 3 ranks; those on 2 are among the studies
+test-mpi: setup-tests ## the same answers on 3 ranks; those on 2 are among the studies
 	timeout 1200 mpirun -n 3 $(MPI_SHARED) $(MPI_PYTEST) -m "not study" tests/mpi
 
-test-ranks: setup ## lines of all topologies and in all planes on 1, 2, 3, 5 and 8 ranks
+test-ranks: setup-tests ## lines of all topologies and in all planes on 1, 2, 3, 5 and 8 ranks
 	timeout 3600 mpirun -n 8 $(MPI_SHARED) $(MPI_PYTEST) tests/mpi/test_rank_counts.py
 
-bench: setup ## what steps cost: against their floor, by phase, spans and ranks
+bench: setup-tests ## what steps cost: against their floor, by phase, spans and ranks
 	@mkdir -p results
 	MPI_FLAGS="$(MPI_FLAGS)" $(PYTEST) -q -s tests/benchmarks $(LONG_RUNS:%=--ignore=%) --benchmark-json=results/bench.json
 
-fuzz: setup ## random small problems; scenes: 4000 that run, 4000 refused, 50 sweeps, 25 killed, 25 on 2 to 4 ranks; SEED=...
+fuzz: setup-tests ## random small problems; scenes: 4000 that run, 4000 refused, 50 sweeps, 25 killed, 25 on 2 to 4 ranks; SEED=...
 	@echo "seeds from $(SEED); FUZZ_SEED=<seed> FUZZ_CASES=1 $(PYTEST) tests/regression/test_fuzz.py replays one"
 	$(PYTEST) -q --hypothesis-profile=others --hypothesis-seed=$(SEED) $$(grep -rl 'import given' tests)
 	FUZZ_SEED=$(SEED) FUZZ_CASES=2000 $(PYTEST) -q tests/regression/test_fuzz.py tests/regression/test_fuzz_equations.py
@@ -101,16 +104,16 @@ fuzz: setup ## random small problems; scenes: 4000 that run, 4000 refused, 50 sw
 	FUZZ_SEED=$(SEED) FUZZ_WINDOWS=300 $(PYTEST) -q tests/regression/test_fuzz_windows.py
 	FUZZ_SEED=$(SEED) FUZZ_CASES=100 timeout 1800 mpirun -n 2 $(MPI_SHARED) $(MPI_PYTEST) -q tests/regression/test_fuzz.py
 
-long-runs: setup ## 20 s and ten minutes of all bodies, 1000 spans killed, exact windows, 540 km; reference solutions
+long-runs: setup-tests ## 20 s and ten minutes of all bodies, 1000 spans killed, exact windows, 540 km; reference solutions
 	$(PYTEST) -q -s $(LONG_RUNS)
 	$(PYTEST) -q -p no:benchmark -m long tests/verification
 
-test-paraview: setup ## open runs in the ParaView of this machine (Debian: paraview python3-paraview xvfb)
+test-paraview: setup-tests ## open runs in the ParaView of this machine (Debian: paraview python3-paraview xvfb)
 	@command -v pvpython >/dev/null && command -v xvfb-run >/dev/null || \
 	    { echo "test-paraview needs pvpython and xvfb-run: apt-get install python3-paraview xvfb"; exit 1; }
 	$(PYTEST) -q tests/paraview
 
-test-readers: setup ## what other programs read of a run: versions of VTK and xarray, from the package index; VTK="9.3.1 9.4.2"
+test-readers: setup-tests ## what other programs read of a run: versions of VTK and xarray, from the package index; VTK="9.3.1 9.4.2"
 	.venv/bin/catenary run en50318_2002 --short --quiet --force -o build/film
 	.venv/bin/catenary run en50318_2002 --short --quiet --force -o build/film_of_window \
 	    --set 'output.field_window_m=[100,100]' output.line_channels_every_s=0.01
@@ -134,7 +137,7 @@ SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_va
     tests/verification/test_ensembles.py::test_lanes_are_filled_again_with_trains_of_other_lengths \
     tests/regression/prepared_line/test_prepared_line.py::test_state_is_kept_and_restored_with_what_was_added
 
-sanitize: setup ## tests with kernels that check memory and arithmetic; SANITIZED_TESTS="FILE..."
+sanitize: setup-tests ## tests with kernels that check memory and arithmetic; SANITIZED_TESTS="FILE..."
 	rm -rf $(SANITIZED)/package
 	$(PYTHON) -I setup.py --quiet build --build-lib $(SANITIZED)/package build_ext --sanitize
 	PYTHONPATH=$(SANITIZED)/package PYTHONMALLOC=malloc \
@@ -150,11 +153,11 @@ aarch64: ## whether a compiler for ARM takes the kernels, without Python (Debian
 	    $(filter-out solver/kernels/python/%,$(filter %.cpp,$(KERNELS)))
 
 # Material for MkDocs warns of what a next major version of MkDocs will change; the bounds hold that off.
-docs: setup links ## the documentation as a site, build/site/index.html; warnings are errors
+docs: setup-tests links ## the documentation as a site, build/site/index.html; warnings are errors
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --config-file .site/mkdocs.yml
 	@echo "documentation: $(CURDIR)/build/site/index.html"
 
-lint: setup ## ruff (lint and format), mypy, clang-format and the compiler's warnings
+lint: setup-tests ## ruff (lint and format), mypy, clang-format and the compiler's warnings
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	.venv/bin/clang-format --dry-run -Werror $(KERNELS)
@@ -180,7 +183,7 @@ links:
 mypy: links
 	MYPYPATH=build/typing $(PYTHON) -m mypy --exclude '/(cases/api|solver/base)/' -p catenary
 
-format: setup ## bring all files into the format of ruff and clang-format
+format: setup-tests ## bring all files into the format of ruff and clang-format
 	$(PYTHON) -m ruff check --fix .
 	$(PYTHON) -m ruff format .
 	.venv/bin/clang-format -i $(KERNELS)

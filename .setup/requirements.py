@@ -20,18 +20,16 @@ def name_of(requirement: str) -> str:
 
 
 def main() -> None:
-    """Print one requirement a line: build, program, films, tables, reports, site and tests."""
+    """Print one requirement a line: build, program, films, tables, reports; with ``tests`` those
+    of tests, lint and documentation too."""
     with open(sys.argv[1], "rb") as file:
         settings = tomllib.load(file)
     project = settings["project"]
+    extras = ["film", "parquet", "report", *(["docs", "test"] if "tests" in sys.argv[2:] else [])]
     wanted = [
         *settings["build-system"]["requires"],
         *(r for r in project["dependencies"] if name_of(r) not in FROM_SYSTEM),
-        *(
-            one
-            for extra in ("film", "parquet", "report", "docs", "test")
-            for one in project["optional-dependencies"][extra]
-        ),
+        *(one for extra in extras for one in project["optional-dependencies"][extra]),
     ]
     print("\n".join(wanted))
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Sets up .venv with everything that Catenary needs; called by `make setup`, safe to repeat.
+# Sets up .venv with everything that Catenary needs; called by `make setup`, safe to repeat. With
+# --tests also what its tests, lint and documentation need: half of the packages.
 #
 # Debian and Ubuntu: PETSc, MPI, HDF5, gmsh's shared libraries and a C++ compiler come from apt, the
 # rest from the package index. Elsewhere (clusters, conda) the python3 on the PATH must bring
@@ -22,6 +23,7 @@ DEBIAN_PACKAGES=(
     g++ python3-dev
 )
 STAMP=.venv/catenary-setup
+TESTS_STAMP=.venv/catenary-tests
 KERNELS_STAMP=.venv/catenary-kernels
 
 say() { printf '%s\n' "$*" >&2; }
@@ -74,8 +76,12 @@ fingerprint() {
 }
 
 is_current() {
-    [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(fingerprint)" ] &&
-        .venv/bin/python -c 'import petsc4py, mpi4py, catenary.base.errors' 2>/dev/null
+    local wanted stamp
+    wanted=$(fingerprint)
+    for stamp in "$STAMP" ${tests:+"$TESTS_STAMP"}; do
+        [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$wanted" ] || return
+    done
+    .venv/bin/python -c 'import petsc4py, mpi4py, catenary.base.errors' 2>/dev/null
 }
 
 # What the kernels are compiled from; their order and names too.
@@ -233,7 +239,7 @@ make_environment() {
         "${python[@]}" -m venv .venv
         finish
     fi
-    rm -f "$STAMP"
+    rm -f "$STAMP" "$TESTS_STAMP"
     "${python[@]}" .setup/system_packages.py .venv ${extra_path:+"$extra_path"}
 }
 
@@ -261,7 +267,7 @@ compile_kernels() {
 install_python_packages() {
     local tested
     work=$(mktemp -d)
-    .venv/bin/python -I .setup/requirements.py pyproject.toml >"$work/requirements.txt"
+    .venv/bin/python -I .setup/requirements.py pyproject.toml $tests >"$work/requirements.txt"
     # petsc4py and h5py are compiled against the system's numpy: nothing may bring another one.
     .venv/bin/python -I - >"$work/system.txt" <<'CODE'
 import numpy
@@ -272,7 +278,7 @@ CODE
     local -a wanted=(--requirement "$work/requirements.txt" --constraint "$work/system.txt")
     tested=.setup/tested/$(.venv/bin/python -I -c \
         'import sys; print("python{}.{}.txt".format(*sys.version_info))')
-    begin "installing Python packages into .venv" "1.2 GB, some 60 s"
+    begin "installing Python packages into .venv" "some 30 s"
     if [ "$newest" ]; then
         pip_install --upgrade --upgrade-strategy eager "${wanted[@]}"
     elif [ -f "$tested" ]; then
@@ -297,10 +303,12 @@ CODE
 }
 
 newest=
+tests=
 case "${1-}" in
---newest) newest=yes ;;
 "") ;;
-*) fail "unknown option $1; there is --newest" ;;
+--tests) tests=tests ;;
+--newest) newest=yes tests=tests ;;
+*) fail "unknown option $1; there are --tests and --newest" ;;
 esac
 if [ ! "$newest" ] && is_current; then
     kernels_are_current || compile_kernels
@@ -313,5 +321,6 @@ install_python_packages
 begin "checking that all packages load"
 .venv/bin/python -I .setup/check.py >&2
 finish
+[ -z "$tests" ] || fingerprint >"$TESTS_STAMP"
 fingerprint >"$STAMP"
 say "setup: ready after $SECONDS s"

@@ -37,7 +37,10 @@ def tested() -> dict[str, str]:
 
 
 def remark() -> str:
-    """One sentence on what differs from the tested versions, empty if nothing does."""
+    """One sentence on what differs from the tested versions, empty if nothing does.
+
+    The packages of tests may be absent.
+    """
     wanted = tested()
     if not wanted:
         return (
@@ -46,9 +49,9 @@ def remark() -> str:
         )
     there = versions_in(SITE) | versions_in(SITE.with_name("system-packages"))
     other = [
-        f"{name} {there.get(name, 'absent')} (tested: {wanted.get(name, 'absent')})"
-        for name in sorted(wanted | there)
-        if there.get(name) != wanted.get(name)
+        f"{name} {version} (tested: {wanted.get(name, 'absent')})"
+        for name, version in sorted(there.items())
+        if version != wanted.get(name)
     ]
     return f"Other than the tested versions: {', '.join(other)}." if other else ""
 
