@@ -165,10 +165,11 @@ class StationPasses:
         native.left_behind(self._starts, self._stretch, links.unknowns, ranges)
         return TrackedLinks(links, reserve, ranges, self._stretch)
 
-    def arrays_in_lanes(self, n_lanes: int, loads: np.ndarray = _NO_LOADS) -> PassArrays:
+    def arrays_in_lanes(self, n_lanes: int, is_loaded: bool = False) -> PassArrays:
         """Arrays of ``n_lanes`` motions at rest; values of an unknown in all lanes are contiguous.
 
-        ``loads`` are those of all lanes [N], or none. One rank, Newmark's method.
+        Loads [N] of whole pairs of unknowns, if there are any, stand where a step puts the
+        accelerations: it reads those of a station before. One rank, Newmark's method.
         """
         given = self.parts.arrays
         n = given.motion.x.size
@@ -176,16 +177,17 @@ class StationPasses:
         own = slice(pad * n_lanes, (pad + n) * n_lanes)
         assert np.shares_memory(given.motion.x, given.factor)
         assert np.shares_memory(given.answer, given.motion.z)
-        factor, answer, velocity = (
+        factor, loads, velocity = (
             aligned_arrays.zeros(size * n_lanes, place)
-            for place, size in enumerate((given.factor.size, n, given.factor.size))
+            for place, size in enumerate((given.factor.size, n + n % 2, given.factor.size))
         )
+        answer = loads[: n * n_lanes]
         reads_rates = np.shares_memory(given.velocity, given.motion.y)
         motion = Motion(factor[own], velocity[own], answer, given.motion.shares, n_lanes)
         return given._replace(
             factor=factor,
             velocity=velocity if reads_rates else factor,
-            loads=loads,
+            loads=loads if is_loaded else _NO_LOADS,
             answer=answer,
             motion=motion,
         )

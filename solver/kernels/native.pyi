@@ -200,8 +200,8 @@ def are_compiled(rows: Layout, factors: Layout) -> bool:
     """Whether kernels were compiled for stations of such rows and factors; general kernels step
     others, with masks found at run time."""
 
-def are_compiled_for_scenes(rows: Layout, factors: Layout) -> bool:
-    """Whether this processor has kernels that step several scenes side by side."""
+def are_compiled_for_scenes(rows: Layout, factors: Layout, scenes: int = ...) -> bool:
+    """Whether this processor has kernels that step so many scenes side by side."""
 
 class Products:
     """Products with rows of K, and C, of stations of each type."""
@@ -282,6 +282,7 @@ class Steps(BlockSteps):
         """Write a file with the parts of the steps, and the inputs ``Ahead``."""
 
 SCENES: int
+MOST_SCENES: int
 
 class SceneSteps:
     """Free steps of a line in ``SCENES`` scenes side by side."""
@@ -319,6 +320,26 @@ class Ensemble:
 
     def at(self, lane: int) -> tuple[int, bool]:
         """Steps that the scene of a lane has taken, and whether its forces were not found then."""
+
+class LaneSteps:
+    """Free steps of tangents side by side, of the stations that move; see
+    ``kernels/tangents/lane_passes.hpp``."""
+
+    @property
+    def begin(self) -> int:
+        """First unknown that moves."""
+
+    @property
+    def end(self) -> int:
+        """The unknown after the last that moves."""
+
+class LanePasses(LaneSteps):
+    """``LaneSteps`` with arrays of all lanes in ``parts``, which they keep, read and write in
+    place; they look at ``guard`` outer stations, or move all from the start on if it is 0."""
+
+    def __init__(
+        self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object, guard: int
+    ) -> None: ...
 
 class TangentSteps:
     """``Steps`` with derivatives by parameters beside them, of ``Tangents``."""

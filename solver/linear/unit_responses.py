@@ -61,6 +61,13 @@ class Windows(NamedTuple):
         """Range of unknowns within reach of [x_low, x_high]."""
         return self.numbering.within(x_low - self.reach, x_high + self.reach)
 
+    @property
+    def n_stations(self) -> int:
+        """Number of stations within a reach, on the average of the line; at least one."""
+        low = self.numbering.low
+        spacing = (low[-1] - low[0]) / max(1, low.size - 1)
+        return max(1, int(np.ceil(self.reach / spacing))) if spacing > 0.0 else low.size
+
 
 class ShortColumns(NamedTuple):
     """Owned parts of columns of A^-1, of each of n places one or several, one after the other.

@@ -10,7 +10,7 @@ import numpy as np
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import Motion, PredictedLineState
 from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.model.switching_links import NO_LINKS
+from catenary.solver.model.alike import kinds_of
 from catenary.solver.tangents.set_up import Change
 
 # Numbers of matrices are kept to so many bits, far more than differences of set-ups know: rows of
@@ -20,7 +20,7 @@ _NO_NUMBERS = np.zeros(0, dtype=np.int64)
 
 
 class LaneSums(NamedTuple):
-    """Sums of the march's motion with weights of the lanes; see
+    """Sums of the march's x, y and z with weights of the lanes; see
     `kernels/tangents/tangent_lanes.hpp`, as for the next two."""
 
     weights: np.ndarray
@@ -37,14 +37,13 @@ class ChangedRows(NamedTuple):
     begin: np.ndarray
     offsets: np.ndarray
     values: np.ndarray
-    ahead: int
+    reach: int
 
 
 class TangentLanes(NamedTuple):
     """Motions of the line in lanes, and what steps them."""
 
-    alone: native.TwoPasses | None
-    together: native.ScenePasses | None
+    passes: native.LanePasses
     motion: Motion
     loads: np.ndarray
     rows: ChangedRows
@@ -53,14 +52,13 @@ class TangentLanes(NamedTuple):
 def groups_of(line: LineIntegrator, changes: Sequence[Change]) -> list[list[int]]:
     """Groups of changes, by number, whose motions are stepped side by side.
 
-    Changes that load the line have groups apart from the others, sorted by the rows that they load:
-    a group computes a product for all its members if one needs it. Without kernels for several
-    scenes each change is a group.
+    One group takes as many as kernels step at once. If there are more, changes that load the line
+    have groups apart from the others, sorted by the rows that they load: a group computes a product
+    for all its members if one needs it. Without kernels for several scenes each change is a group.
     """
-    passes = line.passes
-    assert passes is not None
-    can = all(map(native.are_compiled_for_scenes, passes.rows, passes.columns))
-    most = native.SCENES if can else 1
+    most = _sizes(line)[-1]
+    if len(changes) <= most:
+        return [list(range(len(changes)))] if changes else []
     rows = {
         k: {int(row) for term in change.matrices for row in term.rows}
         for k, change in enumerate(changes)
@@ -94,52 +92,71 @@ def lanes_of(
         Derivatives of the line's acceleration at the start [m/s2 per unit] of each of these.
     """
     n = line.acceleration.size
-    sizes = [1 if len(group) == 1 else native.SCENES for group in groups]
-    rows = [_rows(group, size, n) for group, size in zip(groups, sizes, strict=True)]
+    widths = _sizes(line)
+    sizes = [next(size for size in widths if size >= len(group)) for group in groups]
+    assert line.passes is not None
+    shares = line.passes.parts.arrays.motion.shares
+    rows = [_rows(group, size, n, shares) for group, size in zip(groups, sizes, strict=True)]
     # Groups step one after the other, so that they share room that they fill anew.
     sums = max((of.sums.numbers for of in rows), key=len, default=np.zeros(0))
-    loads = aligned_arrays.zeros((n + n % 2) * max(sizes, default=1), 3)
     return [
         _lanes(
             line,
             own,
-            loads if any(change.loads_line for change in group) else loads[:0],
+            size,
+            any(change.loads_line for change in group),
             of._replace(sums=of.sums._replace(numbers=sums)),
         )
-        for group, own, of in zip(groups, starts, rows, strict=True)
+        for group, own, size, of in zip(groups, starts, sizes, rows, strict=True)
+    ]
+
+
+def _sizes(line: LineIntegrator) -> list[int]:
+    """Numbers of motions that kernels step at once, ascending."""
+    passes = line.passes
+    assert passes is not None
+    return [1] + [
+        size
+        for size in (native.SCENES, native.MOST_SCENES)
+        if all(
+            native.are_compiled_for_scenes(rows, factors, size)
+            for rows, factors in zip(passes.rows, passes.columns, strict=True)
+        )
     ]
 
 
 def _lanes(
-    line: LineIntegrator, starts: Sequence[np.ndarray], loads: np.ndarray, rows: ChangedRows
+    line: LineIntegrator,
+    starts: Sequence[np.ndarray],
+    n_lanes: int,
+    is_loaded: bool,
+    rows: ChangedRows,
 ) -> TangentLanes:
-    """Motions that start with these accelerations, as many as there are or can be."""
+    """Motions that start with these accelerations."""
     passes, state = line.passes, line.motion
     assert passes is not None and isinstance(state, PredictedLineState)
-    n_lanes = 1 if len(starts) == 1 else native.SCENES
-    arrays = passes.arrays_in_lanes(n_lanes, loads)
+    arrays = passes.arrays_in_lanes(n_lanes, is_loaded)
     for lane, start in enumerate(starts):
         still = np.zeros_like(start)
         ahead = state.ahead(still, still, start)
         for numbers, values in zip(arrays.motion[:3], ahead, strict=True):
             numbers[lane::n_lanes] = values
     parts = passes.parts._replace(arrays=arrays)
-    nothing, no_links = np.zeros(0), passes.tracked(NO_LINKS, np.zeros(0))
-    if n_lanes == 1:
-        alone = native.TwoPasses(passes.rows, passes.columns, parts)
-        alone.track(no_links)
-        return TangentLanes(alone, None, arrays.motion, loads, rows)
-    together = native.ScenePasses(passes.rows, passes.columns, parts)
-    together.track(no_links, np.zeros((0, n_lanes)), [nothing] * n_lanes)
-    return TangentLanes(None, together, arrays.motion, loads, rows)
+    # Loads in time move the line everywhere, and at once.
+    waits = not passes.parts.arrays.loads.size and not any(start.any() for start in starts)
+    guard = line.windows.n_stations if waits else 0
+    stepped = native.LanePasses(passes.rows, passes.columns, parts, guard)
+    return TangentLanes(stepped, arrays.motion, arrays.loads, rows)
 
 
-def _rows(changes: Sequence[Change], n_lanes: int, n: int) -> ChangedRows:
+def _rows(changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray) -> ChangedRows:
     """Changes of matrices over all lanes, with a kind for pairs of rows that are equal.
 
     The largest term of each lane is multiplied with sums at all n unknowns. Others, which have few
-    rows mostly, read their sums behind these.
+    rows mostly, read their sums behind these. ``shares`` are those of the march's motion.
     """
+    # Displacement, velocity and acceleration in terms of x, y and z.
+    of_motion = np.array([shares[:3], [0.0, *shares[3:]], [0.0, 0.0, 1.0]])
     terms = [sorted(change.matrices, key=lambda term: -term.values.size) for change in changes]
     most = max(map(len, terms))
     weights, unknowns = np.zeros((max(1, most), 3, n_lanes)), [_NO_NUMBERS]
@@ -152,7 +169,7 @@ def _rows(changes: Sequence[Change], n_lanes: int, n: int) -> ChangedRows:
             behind = n + sum(map(len, unknowns))
             unknowns.append(read)
         for lane, term in own:
-            weights[rank, :, lane] = term.weights
+            weights[rank, :, lane] = term.weights @ of_motion
             rows.append(np.repeat(term.rows, np.diff(term.begin)))
             places.append(behind + np.searchsorted(read, term.columns))
             lanes.append(np.full(term.values.size, lane))
@@ -165,16 +182,12 @@ def _rows(changes: Sequence[Change], n_lanes: int, n: int) -> ChangedRows:
     pair, place = np.divmod(entries, width)
     offsets = (place - 2 * pair).astype(np.int32)
     ends = np.searchsorted(pair, np.arange((n + 1) // 2 + 1))
-    kinds: dict[bytes, int] = {}
-    kept: list[np.ndarray] = []
-    kind_of = np.zeros(ends.size - 1, dtype=np.int32)
-    for i, (begin, end) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
-        key = offsets[begin:end].tobytes() + numbers[begin:end].tobytes()
-        if key not in kinds:
-            kinds[key] = len(kept)
-            kept.append(np.arange(begin, end))
-        kind_of[i] = kinds[key]
-    which = np.concatenate(kept)
+    counts = np.diff(ends)
+    of_pairs = np.full((counts.size, counts.max()), -1.0)
+    of_entries = np.c_[offsets, numbers.reshape(-1, 2 * n_lanes)]
+    of_pairs[pair, np.arange(pair.size) - ends[pair]] = kinds_of(of_entries)[1]
+    first, kinds = kinds_of(of_pairs)
+    which = np.isin(pair, first)
     return ChangedRows(
         sums=LaneSums(
             weights.reshape(-1, 3 * n_lanes),
@@ -182,11 +195,11 @@ def _rows(changes: Sequence[Change], n_lanes: int, n: int) -> ChangedRows:
             listed,
             aligned_arrays.zeros(width * n_lanes, 4),
         ),
-        kinds=kind_of,
-        begin=np.cumsum([0, *map(len, kept)], dtype=np.int64),
+        kinds=kinds,
+        begin=np.cumsum([0, *counts[first]], dtype=np.int64),
         offsets=offsets[which],
         values=aligned_arrays.copy(numbers[which]).reshape(-1, 2 * n_lanes),
-        ahead=int(offsets[place < n].max(initial=0)),
+        reach=int(np.abs(offsets[place < n]).max(initial=0)),
     )
 
 

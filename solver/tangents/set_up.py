@@ -248,7 +248,7 @@ def differentiate(
         Name of the parameter, for messages.
     stencil : mapping of int to float, optional
         Weights of set-ups by numbers of changes; ``CENTRAL`` for a parameter in which the set-up is
-        linear, and only without heads of other kinds than linear chains.
+        linear but for heads, whose mean height it changes little.
 
     Raises
     ------

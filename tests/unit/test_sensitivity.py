@@ -18,6 +18,8 @@ from scenes import load_scene, mesh_of, problem_of
 
 from catenary import InputError
 from catenary.cases.run.prepared import rest_of, sound_rest
+from catenary.cases.scene.load import recorded_scene
+from catenary.cases.scene.problem import resolved
 from catenary.cases.studies.sensitivity.output import as_text, table_of
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.cases.studies.sensitivity.study import Sensitivity, change_by, sensitivity_of
@@ -192,6 +194,30 @@ def test_entries_lists_and_forces_by_speed_are_parameters() -> None:
     changed_force = problem_of(line.changed(force, 2.0)).train.placements[0].static_force
     assert changed_force == pytest.approx(force.values[0] + 2.0)
     assert (sag.unit, sag.change, sag.text) == ("mm", 1.0, "9 values")
+
+
+@pytest.mark.parametrize(
+    "key",
+    [*KEYS, "train.speed_km_h", "irregularities.dropper_lengths.2.3"],
+)
+def test_a_changed_scene_is_that_which_is_checked_as_a_whole(key: str) -> None:
+    """Though only the tables that changed are; and the scene itself stays."""
+    own = scenes(*TINY)
+    parameter, before = own.parameter(key), resolved(own.scene)
+    found = resolved(own.changed(parameter, 0.5))
+    assert found == resolved(recorded_scene(found, Path("changed")))
+    assert found != before == resolved(own.scene)
+    different = {name for name in found if found[name] != before[name]}
+    assert different <= parameter.tables and key.split(".")[0] in different
+
+
+def test_a_change_that_a_scene_refuses_is_told() -> None:
+    own = scenes(*TINY)
+    with pytest.raises(InputError, match=r"train.speed_km_h"):
+        own.changed(own.parameter("train.speed_km_h"), -1000.0)
+    # What one table says of another.
+    with pytest.raises(InputError, match=r"raise_time_s"):
+        own.changed(own.parameter("train.raise_time_s"), 10.0)
 
 
 def test_a_dropper_has_a_length() -> None:

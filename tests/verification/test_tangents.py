@@ -23,12 +23,15 @@ from small_lines import EN_CONTACT_WIRE, WHOLE, en50318_line, mesh_of, numerics,
 from studies import few
 
 from catenary import InputError
+from catenary.cases.run.prepared import sound_rest
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
+from catenary.cases.studies.sensitivity.study import change_by
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
+from catenary.solver.tangents import lanes
 from catenary.solver.tangents.march import Tangents, march_with_tangents
 from catenary.solver.tangents.set_up import Change, SetUp, differentiate, set_up_of
 
@@ -236,14 +239,79 @@ def test_tangents_side_by_side_are_those_of_each_alone() -> None:
     changes = [change_of(problem, name) for name in names]
     changes += [differentiate(faster, now, 1e-3, "speed"), changes[0], changes[2]]
     assert sum(change.loads_line for change in changes) == 5 > native.SCENES
-    together = march_with_tangents(COMM, rest, changes)
-    for number, change in enumerate(changes):
-        alone = march_with_tangents(COMM, rest, [change])
-        for name in ("by_force", "by_uplift", "by_head_height"):
-            found, expected = getattr(together, name)[:, number], getattr(alone, name)[:, 0]
-            # Sums in another order, over 1000 steps.
-            within = 1e-10 * np.abs(expected).max()
-            check(f"{name} of {number}", found, expected, within=within)
+    alone = [march_with_tangents(COMM, rest, [change]) for change in changes]
+    best, *others = reversed(native.targets())
+    try:
+        for target in (best, *others):
+            assert native.set_target(target)
+            # All in one group where vectors hold eight, and in several.
+            for n in (len(changes), len(changes) + 3):
+                numbers = [number % len(changes) for number in range(n)]
+                together = march_with_tangents(COMM, rest, [changes[k] for k in numbers])
+                for number, k in enumerate(numbers):
+                    for name in ("by_force", "by_uplift", "by_head_height"):
+                        found, expected = getattr(together, name), getattr(alone[k], name)[:, 0]
+                        # Sums in another order, over 1000 steps.
+                        within = 1e-10 * np.abs(expected).max()
+                        what = f"{name} of {number}, {target}"
+                        check(what, found[:, number], expected, within=within)
+    finally:
+        native.set_target(best)
+
+
+def evaluated(first: int, last: int) -> list[str]:
+    return [f"evaluation.from_m={first}", f"evaluation.to_m={last}"]
+
+
+class AllAwake:
+    """Kernels of which free steps of tangents move all stations, or their own that are kept."""
+
+    def __init__(self, moves_all: bool) -> None:
+        self.moves_all, self.made = moves_all, []  # type: ignore[var-annotated]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(native, name)
+
+    def LanePasses(self, *parts: Any) -> native.LanePasses:  # noqa: N802
+        *others, guard = parts
+        self.made.append(native.LanePasses(*others, 0 if self.moves_all else guard))
+        return self.made[-1]
+
+
+@pytest.mark.parametrize(
+    "case, words, begins, ends",
+    [
+        ("ac_simple", ["train.start_m=220", *evaluated(280, 330)], False, True),
+        ("re330_stitched", evaluated(250, 350), False, True),
+        # Behind the middle, where elimination of the whole line ends.
+        ("en50318_2002", ["train.start_m=800", *evaluated(860, 900)], True, False),
+    ],
+)
+def test_stations_that_no_wave_has_reached_are_left_out(
+    case: str, words: list[str], begins: bool, ends: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of marches that end before waves are at the line's end, or at its start."""
+    scenes = ChangedScenes(load_scene(case, words))
+    rest = sound_rest(scenes.scene)
+    now = set_up_of(COMM, rest)
+    keys = ["irregularities.dropper_lengths.2.3", "line.contact_wire.tension_N"]
+    changes = [change_by(scenes.parameter(key), scenes, rest, now, COMM) for key in keys]
+    found = {}
+    for moves_all in (True, False):
+        kernels = AllAwake(moves_all)
+        monkeypatch.setattr(lanes, "native", kernels)
+        found[moves_all] = march_with_tangents(COMM, rest, changes)
+        (passes,) = kernels.made
+        n = rest.model.n_unknowns
+        assert (passes.begin > 0, passes.end < n) == (
+            begins and not moves_all,
+            ends and not moves_all,
+        )
+    for name in ("by_force", "by_uplift", "by_head_height"):
+        expected = getattr(found[True], name)
+        # What is left out is 1e-14 of the motion at each of 1000 steps.
+        within = 1e-11 * np.abs(expected).max(axis=(0, 2), keepdims=True)
+        check(name, getattr(found[False], name) / within, expected / within, within=1.0)
 
 
 SHORT = ["line.n_spans=6", "evaluation.from_m=140", "evaluation.to_m=240"]

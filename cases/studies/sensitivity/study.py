@@ -14,7 +14,6 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
 from catenary.cases.terminal.runs_bar import RunsBar
-from catenary.mbs.head.head_arrays import LinearStep
 from catenary.postproc.evaluate import derivatives, filters
 from catenary.postproc.evaluate.derivatives import ForceDerivatives
 from catenary.postproc.evaluate.statistics import covers
@@ -163,8 +162,7 @@ def change_by(
         same = linear and same_matrices(rest.model, at_rest.model)
         return set_up_of(comm, rest, n_steps, now if same or parameter.is_of_train else None)
 
-    heads_are_linear = all(isinstance(head, LinearStep) for head in now.heads)
-    stencil = CENTRAL if linear and heads_are_linear else STENCIL
+    stencil = CENTRAL if linear else STENCIL
     return differentiate(set_up, now, parameter.step, parameter.key, stencil)
 
 

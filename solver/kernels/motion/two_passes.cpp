@@ -19,7 +19,8 @@ T* in(std::span<T> numbers) {
 std::vector<std::unique_ptr<Kernels>> kernels_for(const PassParts& parts, int scenes) {
     std::vector<std::unique_ptr<Kernels>> kernels;
     for (const auto& [rows, factors] : parts.layouts)
-        kernels.push_back((scenes == 1 ? kernels_of : kernels_for_scenes)(rows, factors));
+        kernels.push_back(scenes == 1 ? kernels_of(rows, factors)
+                                      : kernels_for_scenes(rows, factors, scenes));
     return kernels;
 }
 

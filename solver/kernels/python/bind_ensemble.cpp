@@ -61,16 +61,17 @@ class HeldEnsemble {
     Ensemble own_;
 };
 
-bool are_compiled_for_scenes(const Layout& rows, const Layout& factors) {
-    return kernels_for_scenes(rows, factors) != nullptr;
+bool are_compiled_for_scenes(const Layout& rows, const Layout& factors, int scenes) {
+    return kernels_for_scenes(rows, factors, scenes) != nullptr;
 }
 
 }  // namespace
 
 void offer_ensemble(py::module_& module) {
     module.attr("SCENES") = kScenes;
+    module.attr("MOST_SCENES") = kMostScenes;
     module.def("are_compiled_for_scenes", &are_compiled_for_scenes, py::arg("rows"),
-               py::arg("factors"));
+               py::arg("factors"), py::arg("scenes") = kScenes);
     py::class_<ScenePasses>(module, "SceneSteps").def("step", &ScenePasses::step);
     py::class_<HeldScenePasses, ScenePasses>(module, "ScenePasses")
         .def(py::init(&HeldScenePasses::made))

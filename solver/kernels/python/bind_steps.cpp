@@ -1,5 +1,5 @@
 // Python bindings of steps, their rows and errors, and of lines prepared for steps from outside.
-#include "python/from_python.hpp"
+#include "python/pass_parts.hpp"
 #include "schemes/step_error.hpp"
 #include "simulation/simulation.hpp"
 #include "tangents/tangents.hpp"
@@ -30,6 +30,23 @@ class HeldSteps : public Steps {
         for (const Head* head : parts().heads) line.heads.push_back(parts_of(*head));
         line.ahead = given;
         write_line(path, line);
+    }
+
+  private:
+    Kept kept_;
+};
+
+/// Free steps of tangents that keep their arrays alive.
+class HeldLanePasses : public LanePasses {
+  public:
+    HeldLanePasses(PassParts parts, int64_t guard, Kept kept)
+        : LanePasses(std::move(parts), guard), kept_(std::move(kept)) {}
+    static std::unique_ptr<HeldLanePasses> made(const std::vector<Layout>& rows,
+                                                const std::vector<Layout>& factors,
+                                                const py::object& parts, int64_t guard) {
+        Kept kept;
+        PassParts found = pass_parts(rows, factors, parts, kept);
+        return std::make_unique<HeldLanePasses>(std::move(found), guard, std::move(kept));
     }
 
   private:
@@ -107,6 +124,11 @@ void offer_steps(py::module_& module) {
         .def("take",
              [](HeldSteps& steps, int64_t first, int64_t end) { return steps.take(first, end); })
         .def("write", &HeldSteps::write);
+    py::class_<LanePasses>(module, "LaneSteps")
+        .def_property_readonly("begin", &LanePasses::begin)
+        .def_property_readonly("end", &LanePasses::end);
+    py::class_<HeldLanePasses, LanePasses>(module, "LanePasses")
+        .def(py::init(&HeldLanePasses::made));
     py::class_<HeldTangentSteps>(module, "TangentSteps")
         .def(py::init(
             [](const py::object& parts, const py::object& block, const py::object& tangents) {

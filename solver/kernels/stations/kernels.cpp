@@ -10,9 +10,10 @@
     namespace catenary::target {                                              \
     std::unique_ptr<Kernels> make(const Layout& rows, const Layout& factors); \
     }
-#define CATENARY_DECLARE_FOR_SCENES(target)                                              \
-    namespace catenary::target {                                                         \
-    std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors); \
+#define CATENARY_DECLARE_FOR_SCENES(target)                                             \
+    namespace catenary::target {                                                        \
+    std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors, \
+                                             int scenes);                               \
     }
 CATENARY_DECLARE(baseline)
 #ifdef CATENARY_X86_TARGETS
@@ -29,10 +30,11 @@ namespace catenary {
 namespace {
 
 using Make = std::unique_ptr<Kernels> (*)(const Layout&, const Layout&);
+using MakeForScenes = std::unique_ptr<Kernels> (*)(const Layout&, const Layout&, int scenes);
 struct Target {
     std::string name;
     Make make;
-    Make make_for_scenes;  ///< null where vectors are too short for it
+    MakeForScenes make_for_scenes;  ///< null where vectors are too short for it
 };
 
 /// Targets that this processor can run, the best last.
@@ -81,9 +83,9 @@ std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors) {
     return chosen()->make(rows, factors);
 }
 
-std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& factors) {
-    const Make make = chosen()->make_for_scenes;
-    return make ? make(rows, factors) : nullptr;
+std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& factors, int scenes) {
+    const MakeForScenes make = chosen()->make_for_scenes;
+    return make ? make(rows, factors, scenes) : nullptr;
 }
 
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows) {

@@ -21,8 +21,9 @@
 namespace catenary {
 
 constexpr int kMostUnknowns = 32, kMostPieces = 8, kKinds = 4;
-/// Scenes that kernels step side by side, and the most numbers of a station in all of them.
-constexpr int kScenes = 4, kMostNumbers = 64;
+/// Scenes that kernels step side by side: four, or eight where vectors hold them; and the most
+/// numbers of a station in all of them.
+constexpr int kScenes = 4, kMostScenes = 8, kMostNumbers = 64;
 
 /// Kinds of products of each square, a bit for each.
 using Mask = std::array<std::array<uint8_t, kMostPieces>, kMostPieces>;

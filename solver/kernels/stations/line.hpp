@@ -127,8 +127,8 @@ class Kernels {
 /// Kernels of these layouts, compiled for them or general; null if there are more unknowns than
 /// general ones take.
 std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors);
-/// Kernels of `kScenes` scenes side by side, or null if none were compiled.
-std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& factors);
+/// Kernels of so many scenes side by side, or null if none were compiled.
+std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& factors, int scenes);
 /// Kernels that make products only, and kernels that solve only.
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows);
 std::unique_ptr<Kernels> kernels_of_factors(const Layout& factors);

@@ -113,8 +113,12 @@ std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& facto
     return nullptr;
 }
 
-std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors) {
-    return make_for_scenes<kScenes>(rows, factors);
+std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors, int scenes) {
+    if (scenes == kScenes) return make_for_scenes<kScenes>(rows, factors);
+#if defined(CATENARY_TARGET_HAS_AVX512)
+    if (scenes == kMostScenes) return make_for_scenes<kMostScenes>(rows, factors);
+#endif
+    return nullptr;
 }
 
 }  // namespace catenary::CATENARY_TARGET

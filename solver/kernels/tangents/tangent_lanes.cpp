@@ -26,19 +26,17 @@ struct Wide<1> {
     static double& at(double* numbers) { return *numbers; }
     static double at(const double* numbers) { return *numbers; }
 };
-using Scenes = Wide<kScenes>;
 
 /// Fill in the sums with the same weights, of n unknowns that `unknown` gives the numbers of.
 template <int64_t L, class Unknown>
-[[gnu::always_inline]] inline void add_up(const LineMotion& motion, const double* weights,
-                                          int64_t n, Unknown unknown, double* sums) {
-    const typename Wide<L>::Numbers by_d = Wide<L>::at(weights), by_v = Wide<L>::at(weights + L),
-                                    by_a = Wide<L>::at(weights + 2 * L);
-    const double *d = motion.displacement.data(), *v = motion.velocity.data(),
-                 *a = motion.acceleration.data();
+[[gnu::always_inline]] inline void add_up(const Motion& march, const double* weights, int64_t n,
+                                          Unknown unknown, double* sums) {
+    const typename Wide<L>::Numbers by_x = Wide<L>::at(weights), by_y = Wide<L>::at(weights + L),
+                                    by_z = Wide<L>::at(weights + 2 * L);
+    const double *x = march.x.data(), *y = march.y.data(), *z = march.z.data();
     for (int64_t i = 0; i < n; ++i) {
         const int64_t u = unknown(i);
-        Wide<L>::at(sums + L * i) = d[u] * by_d + v[u] * by_v + a[u] * by_a;
+        Wide<L>::at(sums + L * i) = x[u] * by_x + y[u] * by_y + z[u] * by_z;
     }
 }
 
@@ -65,20 +63,21 @@ template <int64_t L>
 /// Pairs of rows that are taken at a time, so that their sums are still near the processor.
 constexpr int64_t kPairsAtATime = 64;
 
+/// Put the loads of the pairs of rows from `low` to `high`.
 template <int64_t L>
-[[gnu::always_inline]] inline void load(const ChangedRows& rows, const LineMotion& motion,
-                                        double* loads) {
+[[gnu::always_inline]] inline void load(const ChangedRows& rows, const Motion& motion, int64_t low,
+                                        int64_t high, double* loads) {
     const auto& [weights, begin, unknowns, numbers] = rows.sums;
-    const int64_t n = size(motion.displacement), n_pairs = size(rows.kinds);
+    const int64_t n = size(motion.x);
     for (int64_t i = 1; i < weights.rows; ++i)
         add_up<L>(
             motion, weights[i].data(), begin[i] - begin[i - 1],
             [from = &unknowns[begin[i - 1]]](int64_t k) { return from[k]; },
             numbers.data() + L * (n + begin[i - 1]));
-    int64_t ready = 0;
-    for (int64_t first = 0; first < n_pairs; first += kPairsAtATime) {
-        const int64_t last = std::min(first + kPairsAtATime, n_pairs);
-        const int64_t until = std::min(2 * last + rows.ahead, n);
+    int64_t ready = std::max<int64_t>(0, 2 * low - rows.reach);
+    for (int64_t first = low; first < high; first += kPairsAtATime) {
+        const int64_t last = std::min(first + kPairsAtATime, high);
+        const int64_t until = std::min(2 * last + rows.reach, n);
         add_up<L>(
             motion, weights[0].data(), until - ready, [ready](int64_t k) { return ready + k; },
             numbers.data() + L * ready);
@@ -86,53 +85,51 @@ template <int64_t L>
         multiply<L>(rows, first, last, loads);
     }
 }
-CATENARY_FOR_TARGETS
-void load_one(const ChangedRows& rows, const LineMotion& motion, double* loads) {
-    load<1>(rows, motion, loads);
+/// Call a function with the number of lanes as a constant.
+template <class F>
+[[gnu::always_inline]] inline void with_lanes(int64_t n, F&& function) {
+    if (n == 1) return function(std::integral_constant<int64_t, 1>{});
+    if (n == kScenes) return function(std::integral_constant<int64_t, kScenes>{});
+    function(std::integral_constant<int64_t, kMostScenes>{});
 }
 CATENARY_FOR_TARGETS
-void load_scenes(const ChangedRows& rows, const LineMotion& motion, double* loads) {
-    load<kScenes>(rows, motion, loads);
+void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t low, int64_t high,
+          double* loads) {
+    with_lanes(n_lanes, [&](auto n) __attribute__((always_inline)) {
+        load<n>(rows, march, low, high, loads);
+    });
 }
 
-/// Add the answer to a force in each scene to motions.
-CATENARY_FOR_TARGETS
-void add_to_scenes(const double* forces, const double* answer, int64_t n, double* x, double* y,
-                   double* z, const double* gains) {
-    const Scenes::Numbers force = Scenes::at(forces), to_x = gains[0] * force,
-                          to_y = gains[1] * force, to_z = gains[2] * force;
+/// Add the answer to a force in each of L lanes [N], of the unknowns from `begin` on, to motions.
+template <int64_t L>
+[[gnu::always_inline]] inline void add(const double* forces, const double* answer, int64_t n,
+                                       double* x, double* y, double* z, const double* gains) {
+    const typename Wide<L>::Numbers force = Wide<L>::at(forces), to_x = gains[0] * force,
+                                    to_y = gains[1] * force, to_z = gains[2] * force;
     for (int64_t j = 0; j < n; ++j) {
-        Scenes::at(x + kScenes * j) += to_x * answer[j];
-        Scenes::at(y + kScenes * j) += to_y * answer[j];
-        Scenes::at(z + kScenes * j) += to_z * answer[j];
+        Wide<L>::at(x + L * j) += to_x * answer[j];
+        Wide<L>::at(y + L * j) += to_y * answer[j];
+        Wide<L>::at(z + L * j) += to_z * answer[j];
     }
 }
-
-/// Add the answer to a force in each lane [N], of the unknowns from `begin` on, to the motions.
+CATENARY_FOR_TARGETS
 void add_answer(const double* forces, std::span<const double> answer, int64_t begin,
                 const Motion& motion, std::span<const double> gains) {
-    if (motion.spacing == 1) {
-        catenary::add_answer(forces[0], answer, begin, motion, gains);
-        return;
-    }
-    const int64_t n = size(answer);
+    const int64_t n = size(answer), lanes = motion.spacing;
     const auto of = [&](std::span<double> all) {
-        return part(all, begin * kScenes, (begin + n) * kScenes).data();
+        return part(all, begin * lanes, (begin + n) * lanes).data();
     };
-    add_to_scenes(forces, answer.data(), n, of(motion.x), of(motion.y), of(motion.z), gains.data());
+    double *x = of(motion.x), *y = of(motion.y), *z = of(motion.z);
+    with_lanes(lanes, [&](auto l) __attribute__((always_inline)) {
+        add<l>(forces, answer.data(), n, x, y, z, gains.data());
+    });
 }
 
 }  // namespace
 
-void take_free_step(const TangentLanes& lanes) {
-    if (lanes.alone)
-        lanes.alone->step();
-    else
-        lanes.together->step();
-}
-
-void load(const TangentLanes& lanes, const LineMotion& motion) {
-    (lanes.n() == 1 ? load_one : load_scenes)(lanes.rows, motion, lanes.loads.data());
+void load(const TangentLanes& lanes, const Motion& march) {
+    const int64_t low = lanes.passes->begin() / 2, high = (lanes.passes->end() + 1) / 2;
+    load(lanes.rows, march, lanes.n(), low, high, lanes.loads.data());
 }
 
 void superpose(const Contacts& contacts, Array2<double> forces, const TangentLanes& lanes) {

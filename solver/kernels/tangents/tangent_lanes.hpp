@@ -1,12 +1,12 @@
 #pragma once
 // Motions of the line in several tangents, which step side by side.
 #include "contact/contacts.hpp"
-#include "ensemble/scene_passes.hpp"
+#include "tangents/lane_passes.hpp"
 
 namespace catenary {
 
-/// Sums of the march's displacement, velocity and acceleration in L lanes, with weights of their
-/// own: (L,) for each of the three. Those with the first weights are at all unknowns; behind them
+/// Sums of the march's x, y and z in L lanes, with weights of their own: (L,) for each of the
+/// three. Those with the first weights are at all unknowns; behind them
 /// stand those with weights[i] at the unknowns from begin[i - 1] to begin[i].
 struct LaneSums {
     Array2<const double> weights;
@@ -24,23 +24,17 @@ struct ChangedRows {
     std::span<const int64_t> begin;
     std::span<const int32_t> offsets;
     Array2<const double> values;  ///< (n, 2 L) of the one row in all lanes, then of the other
-    int64_t ahead;                ///< how far behind a row the sums at all unknowns are read
-    CATENARY_RECORD(sums, kinds, begin, offsets, values, ahead)
-};
-
-/// The march's motion at the end of a step, (n_local,) each.
-struct LineMotion {
-    std::span<const double> displacement, velocity, acceleration;
+    int64_t reach;                ///< how far from a pair the sums at all unknowns are read
+    CATENARY_RECORD(sums, kinds, begin, offsets, values, reach)
 };
 
 /// Motions of the line in L tangents: the numbers of an unknown in all of them follow each other.
 struct TangentLanes {
-    TwoPasses* alone;         ///< takes the step of a single one without forces; or null
-    ScenePasses* together;    ///< that of `kScenes`; or null
-    Motion motion;            ///< of all lanes; L is its spacing
+    LanePasses* passes;       ///< take the step without forces
+    Motion motion;            ///< of all lanes; L is its spacing: 1, `kScenes` or `kMostScenes`
     std::span<double> loads;  ///< that a step reads, of whole pairs; none if nothing loads the line
     ChangedRows rows;
-    CATENARY_RECORD(alone, together, motion, loads, rows)
+    CATENARY_RECORD(passes, motion, loads, rows)
 
     int64_t n() const { return motion.spacing; }
     /// The motion in one lane.
@@ -50,10 +44,9 @@ struct TangentLanes {
     }
 };
 
-/// Take the step without forces.
-void take_free_step(const TangentLanes& lanes);
-/// Put all loads: minus the products of changed matrices with the march's motion.
-void load(const TangentLanes& lanes, const LineMotion& motion);
+/// Put the loads of all unknowns that move: minus the products of changed matrices with the march's
+/// motion.
+void load(const TangentLanes& lanes, const Motion& march);
 /// Add the answers to contact forces (n_contacts, L) [N] to the motions.
 void superpose(const Contacts& contacts, Array2<double> forces, const TangentLanes& lanes);
 /// Add the answers to forces (n, L) [N] of links with these numbers, which are minus their

@@ -36,10 +36,7 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
       tangents_(std::move(tangents)),
       heads_(this->parts().heads, tangents_.pairs, force()) {
     const StepParts& own = this->parts();
-    const size_t n_unknowns = own.contacts.motion.x.size();
     for (const TangentGroup& group : tangents_.groups) {
-        if (!group.lanes.loads.empty())
-            for (auto* numbers : {&displacement_, &velocity_}) numbers->resize(n_unknowns);
         if (static_cast<int64_t>(group.tangents.size()) > group.lanes.n())
             throw std::invalid_argument("a group of tangents has more than lanes");
         for (const Tangent& tangent : group.tangents)
@@ -51,7 +48,7 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
     for (auto* numbers : {&right_, &solution_, &left_, &change_, &compensations_})
         numbers->resize(most);
     for (auto* numbers : {&matrix_, &factors_}) numbers->resize(most * most);
-    side_by_side_.resize(most * kScenes);
+    side_by_side_.resize(most * kMostScenes);
     for (auto* numbers : {&index_, &order_}) numbers->resize(most);
     acts_ = std::make_unique<bool[]>(most);
     std::fill_n(acts_.get(), most, true);
@@ -62,7 +59,6 @@ Taken TangentSteps::take(int64_t first, int64_t end) {
         heads_.keep();
         const Taken taken = Steps::take(number, number + 1);
         if (taken.begun) return {number - first, true, false};
-        read_motion();
         find_acting();
         count();
         fill_matrix();
@@ -70,13 +66,6 @@ Taken TangentSteps::take(int64_t first, int64_t end) {
         if (taken.is_full) return {number + 1 - first, false, true};
     }
     return {end - first, false, false};
-}
-
-void TangentSteps::read_motion() {
-    if (displacement_.empty()) return;
-    const Motion& motion = parts().contacts.motion;
-    displacements(motion, 0, displacement_);
-    velocities(motion, 0, velocity_);
 }
 
 /// Find the contacts and links that act in the step that was taken.
@@ -146,12 +135,16 @@ void TangentSteps::follow(const TangentGroup& group, int64_t number) {
     const int64_t n_lanes = lanes.n(), m = acting_.n(), n = size(acting_.contacts);
     const double time = block().times[number] - course().since;
     const int64_t n_tangents = size(group.tangents);
-    if (!lanes.loads.empty()) {
-        catenary::load(lanes, {displacement_, velocity_, parts().contacts.motion.z});
+    const Motion& march = parts().contacts.motion;
+    const bool is_loaded = !lanes.loads.empty();
+    wake(*lanes.passes);
+    lanes.passes->follow(is_loaded ? &march : nullptr);
+    if (is_loaded) {
+        catenary::load(lanes, march);
         for (int64_t s = 0; s < n_tangents; ++s)
             load(group.tangents[s], lanes, s, group.tangents[s].speed * time);
     }
-    take_free_step(lanes);
+    lanes.passes->step();
     // Of all contacts, and of acting links.
     const Array2<double> forces{side_by_side_.data(), n_contacts(), n_lanes},
         of_links{side_by_side_.data() + n_contacts() * n_lanes, m - n, n_lanes};
@@ -173,6 +166,17 @@ void TangentSteps::follow(const TangentGroup& group, int64_t number) {
     superpose(parts().contacts, forces, lanes);
     compensate(parts().contacts, acting_.numbers, of_links, lanes);
     show_arms(group, number);
+}
+
+/// Let the stations move that forces move.
+void TangentSteps::wake(LanePasses& passes) const {
+    const Contacts& contacts = parts().contacts;
+    for (int64_t i : acting_.contacts) {
+        const auto& [low, high] = contacts.touches[i].filled;
+        passes.wake(low, high);
+    }
+    const auto& [start, at, width, data] = contacts.link_columns;
+    for (int64_t d : acting_.numbers) passes.wake(start[d], start[d] + width[d]);
 }
 
 /// Derivatives of the rows that drive the heads in a step; no rows if they do not change.

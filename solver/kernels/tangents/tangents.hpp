@@ -86,11 +86,11 @@ class TangentSteps : public Steps {
         int64_t n() const { return static_cast<int64_t>(contacts.size() + rows.size()); }
     };
 
-    void read_motion();
     void find_acting();
     void count();
     void fill_matrix();
     void follow(const TangentGroup& group, int64_t number);
+    void wake(LanePasses& passes) const;
     void solve(const Tangent& tangent, const Motion& own);
     void load(const Tangent& tangent, const TangentLanes& lanes, int64_t lane, double way) const;
     Array2<const double> changed_drives(const Tangent& tangent, int64_t number) const;
@@ -106,11 +106,10 @@ class TangentSteps : public Steps {
 
     MarchTangents tangents_;
     HeadTangents heads_;
-    std::vector<double> displacement_, velocity_;  ///< of the line
-    std::vector<double> place_, rate_;             ///< derivatives of gaps without forces
-    std::vector<double> forces_;                   ///< of contacts
-    std::vector<double> compensations_;            ///< of acting links
-    std::vector<double> side_by_side_;  ///< forces of contacts, and of acting links, in all lanes
+    std::vector<double> place_, rate_;   ///< derivatives of gaps without forces
+    std::vector<double> forces_;         ///< of contacts
+    std::vector<double> compensations_;  ///< of acting links
+    std::vector<double> side_by_side_;   ///< forces of contacts, and of acting links, in all lanes
     Acting acting_, was_;
     bool has_begun_ = false;
     std::vector<double> matrix_, right_, solution_, factors_, left_, change_;
