@@ -254,7 +254,8 @@ def appears_whole(path: Path) -> Iterator[Path]:
         yield partial
         os.replace(partial, path)
     except BaseException:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # where nothing can be written the first error tells why
+            partial.unlink(missing_ok=True)
         raise
 
 
@@ -313,7 +314,7 @@ def write_into(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
     return [folder / name for name in content]
 
 
-def unwritten(path: Path, error: OSError) -> RunBroken:
+def unwritten(path: Path, error: Exception) -> RunBroken:
     """The error for the user where a file or folder could not be written."""
     return RunBroken(
         f"writing {path} failed ({reason(error)}): {remedy(error)}; what was written before stays "

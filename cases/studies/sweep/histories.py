@@ -179,7 +179,7 @@ def _written(path: Path) -> Iterator[h5py.File]:
         path.parent.mkdir(parents=True, exist_ok=True)
         with appears_whole(path) as partial, opened(partial, "w") as file:
             yield file
-    except OSError as error:
+    except (OSError, RuntimeError) as error:  # h5py raises both
         raise unwritten(path, error) from error
 
 
