@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -111,12 +111,14 @@ class Observation:
     values : by the name of a pantograph, or under "" for the run; NaN where its record gives none
     unjudged : why values are NaN, or judge nothing, by the same names
     absent : why runs of this scene have no such quantity, empty if they have
+    so_far : why values may still grow, empty if they are final
     note : remark on the quantity where it is a limit
     """
 
     values: Mapping[str, float] = field(default_factory=dict)
     unjudged: Mapping[str, str] = field(default_factory=dict)
     absent: str = ""
+    so_far: str = ""
     note: str = ""
 
 
@@ -142,6 +144,11 @@ class ObservedRun:
 
 
 Observe = Callable[[ObservedRun], Observation]
+# Quantities that grow from step to step, as pantographs pass.
+_OF_PASSAGES = {
+    *("arm_uplift", "strip_place", "contact_wire_tension"),
+    *("dropper_force_max", "dropper_compression", "dropper_slackenings"),
+}
 
 
 def observe(
@@ -150,7 +157,14 @@ def observe(
     """The quantities of ``names`` of a run, from its ``results`` and ``statistics``. Not
     collective."""
     run = ObservedRun(results, statistics)
-    return {name: OBSERVED[name](run) for name in dict.fromkeys(names)}
+    found = {name: OBSERVED[name](run) for name in dict.fromkeys(names)}
+    if all(p.covered for p in statistics.pantographs):
+        return found
+    why = "the record does not cover the evaluation stretch"
+    return {
+        name: replace(one, so_far=why) if name in _OF_PASSAGES else one
+        for name, one in found.items()
+    }
 
 
 def _one(value: float, missing: str = "") -> Observation:

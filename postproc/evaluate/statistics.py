@@ -41,6 +41,7 @@ class PantographStatistics:
     histogram_edges : (n + 1,) edges of the bins of the 20 Hz force [N]
     histogram_percent : (n,) share of time in each bin [%]
     complaint : why there are no statistics, a sentence
+    covered : whether its record covers the evaluation stretch
     unjudged : why no criterion is judged by statistics that there are, a sentence
     """
 
@@ -59,6 +60,7 @@ class PantographStatistics:
     histogram_edges: np.ndarray = field(default_factory=lambda: np.zeros(1))
     histogram_percent: np.ndarray = field(default_factory=lambda: np.zeros(0))
     complaint: str = ""
+    covered: bool = True
     unjudged: str = ""
 
 
@@ -261,6 +263,7 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
             name,
             complaint=f"No statistics of the {_noun(name)}: its record covers {seen}, the "
             f"evaluation stretch is {start:.0f} to {end:.0f} m.",
+            covered=False,
         )
     within = (position >= start) & (position <= end)
     del position

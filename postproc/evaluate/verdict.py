@@ -185,6 +185,9 @@ class _Judge:
                 because, absent = str(why), True
         if not because:
             passed = bool(_MET[rule.relation](value, limit))
+            # A value that may still grow is beyond a limit for good, and below it for now.
+            if observation.so_far and passed != (rule.relation in (">", ">=")):
+                passed, because = None, observation.so_far
         return Criterion(
             rule.title + (f", {name}" if self.several and name else ""),
             value,
