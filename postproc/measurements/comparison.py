@@ -110,7 +110,7 @@ class _Comparing:
         self.uplift: UpliftAtSupports | None = None
         self.figures: list[Compared] = []
         self.findings: list[Finding] = []
-        self.remarks: list[str] = []
+        self.remarks = list(results.damage)
 
     def _run(self, number: int) -> RunForce:
         if number not in self._runs:
@@ -146,6 +146,12 @@ class _Comparing:
         valid = slice(passage.margin(dt), own.place.size - passage.margin(dt))
         place, force = own.place[valid], passage.in_band(force, dt)[valid]
         begin, end = self._stretch(run)
+        if begin >= end:
+            raise InputError(
+                f"{self._results.path} has the {name} from {run.position[0]:g} to "
+                f"{run.position[-1]:g} m, and nothing of what is compared, {passage.stretch[0]:g} "
+                f"to {passage.stretch[1]:g} m"
+            )
         length = float(place[-1] - place[0]) if place.size else 0.0
         least = LEAST_PERIODS * run.speed / passage.cut_off
         if min(length, end - begin) < least:
