@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.line_record import LineRecord
-from catenary.postproc.read.records import Records
+from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.registration import Registration
+from catenary.postproc.read.validated_file import ValidatedFile
 
 # Places along the line come from sums of span lengths, which round by far less [m].
 _ROUNDING = 1e-6
@@ -41,33 +41,8 @@ class ContactProfile(NamedTuple):
         return x, np.insert(values, self.breaks, np.nan)
 
 
-class ResultTables(Protocol):
-    """The tables of a result file, which is open and valid, or of a march that wrote none; see
-    `ValidatedFile`."""
-
-    attrs: dict[str, Any]
-    facts: dict[str, np.ndarray]
-    sizes: dict[str, int]
-    record: LineRecord
-
-    @property
-    def records(self) -> Records: ...
-
-    @property
-    def damage(self) -> list[str]: ...
-
-    @property
-    def has_energies(self) -> bool: ...
-
-    def __contains__(self, path: str) -> bool: ...
-
-    def __getitem__(self, path: str) -> Any: ...
-
-    def extremes(self, n_steps: int) -> dict[str, np.ndarray] | None: ...
-
-    def state(self) -> Any: ...
-
-    def close(self) -> None: ...
+# The tables of a result file, which is open and valid, or of a march that wrote none.
+ResultTables = ValidatedFile | MarchedFile
 
 
 class LineOfRun:
