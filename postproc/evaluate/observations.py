@@ -6,7 +6,7 @@ Each function is named in ``standards.quantities``; its values are in the unit t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -63,24 +63,10 @@ def wire_at_rest(results: Results) -> WireAtRest | None:
     x = x[in_stretch(x, *results.evaluation)]
     if not x.size:
         return None
-    heights = np.array([_height_at(profile, x) for profile in profiles])
+    heights = np.array([profile.height_at(x) for profile in profiles])
     lowest = np.nanmin(heights, axis=0)
     y, sweep = _lateral(profiles, x, lowest)
     return WireAtRest(x, lowest, y, sweep)
-
-
-def _pieces(profile: ContactProfile) -> Iterator[slice]:
-    ends = [0, *profile.breaks.tolist(), profile.x.size]
-    yield from (slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True) if b > a)
-
-
-def _height_at(profile: ContactProfile, x: np.ndarray) -> np.ndarray:
-    """Height of the lowest piece of a wire [m], infinite where it has none."""
-    height = np.full(x.size, np.inf)
-    for piece in _pieces(profile):
-        own = np.interp(x, profile.x[piece], profile.height[piece], np.inf, np.inf)
-        height = np.minimum(height, own)
-    return height
 
 
 def _lateral(
@@ -91,7 +77,7 @@ def _lateral(
     for profile in profiles:
         if profile.y is None:
             return None, None
-        for piece in _pieces(profile):
+        for piece in profile.pieces():
             at, y, height = profile.x[piece], profile.y[piece], profile.height[piece]
             met = (at >= x[0]) & (at <= x[-1])
             met &= height <= np.interp(at, x, lowest) + _SAME_HEIGHT

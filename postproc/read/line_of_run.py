@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cached_property
 from typing import NamedTuple
 
@@ -34,6 +35,20 @@ class ContactProfile(NamedTuple):
     x: np.ndarray
     height: np.ndarray
     y: np.ndarray | None = None
+
+    def pieces(self) -> list[slice]:
+        """Its nodes, piece by piece."""
+        ends = [0, *self.breaks.tolist(), self.x.size]
+        return [slice(*pair) for pair in itertools.pairwise(ends) if pair[0] < pair[1]]
+
+    def height_at(self, x: np.ndarray) -> np.ndarray:
+        """Height of its lowest piece at places ``x`` along the track [m], infinite where it has
+        none."""
+        height = np.full(np.shape(x), np.inf)
+        for own in self.pieces():
+            piece = np.interp(x, self.x[own], self.height[own], np.inf, np.inf)
+            height = np.minimum(height, piece)
+        return height
 
     def drawn(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places along the track and values at the nodes, with a gap between pieces."""
@@ -139,12 +154,13 @@ class LineOfRun:
         masts = self.line("support_x")
         middle = 0.5 * sum(self.evaluation)
         span = int(np.clip(np.searchsorted(masts, middle, side="right") - 1, 0, masts.size - 2))
-        wires = self._contact_wires_in(masts)
+        middles = 0.5 * (masts[:-1] + masts[1:])
+        heights = [wire.height_at(middles) for wire in self.contact_profiles().values()]
+        wires = np.isfinite(heights).sum(axis=0)
         usual = np.flatnonzero(wires == np.median(wires))
         if wires[span] <= np.median(wires) or not usual.size:
             return span
-        away = np.abs(0.5 * (masts[usual] + masts[usual + 1]) - middle)
-        return int(usual[np.argmin(away)])
+        return int(usual[np.argmin(np.abs(middles[usual] - middle))])
 
     @cached_property
     def span_at_rest(self) -> int:
@@ -154,14 +170,3 @@ class LineOfRun:
         if not at.size:
             return self.reference_span
         return int(np.searchsorted(masts, 0.5 * (at[0] + at[-1]), side="right")) - 1
-
-    def _contact_wires_in(self, masts: np.ndarray) -> np.ndarray:
-        """Number of contact wires in each span, (n_spans,)."""
-        x, elements = self.line("node_points")[:, 0], self.elements()
-        middles = 0.5 * (masts[:-1] + masts[1:])
-        count = np.zeros(middles.size)
-        for name in self.wires_of(Role.CONTACT):
-            low, high = x[elements[name]].T
-            at = np.clip(np.searchsorted(high, middles), None, high.size - 1)
-            count += (low[at] <= middles) & (middles <= high[at])
-        return count
