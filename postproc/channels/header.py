@@ -43,17 +43,8 @@ def wire_roles(line: Line) -> dict[str, str]:
 def line_datasets(
     line: Line, mesh: LineMesh, evaluation: tuple[float, float]
 ) -> dict[str, np.ndarray]:
-    """Datasets of ``/line``: masts, spans of the droppers, ranges, chains of nodes. Not collective.
-
-    Parameters
-    ----------
-    line : Line
-        The line.
-    mesh : LineMesh
-        Mesh of the line.
-    evaluation : tuple of float
-        Stretch whose statistics are judged, from and to [m].
-    """
+    """Datasets of ``/line``: masts, spans of the droppers, ranges, chains of nodes; ``evaluation``
+    is the stretch whose statistics are judged [m]. Not collective."""
     masts = line.support_positions
     dropper_x = mesh.x(mesh.droppers[:, 1])
     datasets = {
@@ -85,19 +76,7 @@ def static_datasets(
     elasticity: Elasticity,
 ) -> dict[str, np.ndarray]:
     """Datasets of ``/static``: droppers, profiles, registration and elasticity at rest, but not the
-    lengths to which droppers are cut. Not collective.
-
-    Parameters
-    ----------
-    line : Line
-        The line.
-    mesh : LineMesh
-        Mesh of the line.
-    equilibrium : Equilibrium
-        The line at rest.
-    elasticity : Elasticity
-        Elasticity of the line at rest.
-    """
+    lengths to which droppers are cut. Not collective."""
     contact = np.concatenate([mesh.wires[wire.name] for wire in line.wires_of(Role.CONTACT)])
     return {
         "static/dropper_force": equilibrium.dropper_force,

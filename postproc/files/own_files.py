@@ -77,15 +77,8 @@ def new_part(path: Path) -> Path:
 
 
 def remove_stale(folder: Path, names: Iterable[str] = OWN_FILES[1:]) -> None:
-    """Remove files that an earlier run or report left.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run.
-    names : iterable of str, optional
-        The files; all but the result file without it.
-    """
+    """Remove files that an earlier run or report left in a folder; all but the result file without
+    their ``names``."""
     for name in names:
         try:
             (folder / name).unlink(missing_ok=True)

@@ -134,19 +134,11 @@ def chosen(times: np.ndarray, options: FilmOptions) -> np.ndarray:
 
 
 def times_of_pictures(shown: np.ndarray, speed: float, every: float) -> np.ndarray:
-    """Times of the pictures, such that the train goes equally far between them.
+    """Times of the pictures [s], such that the train goes equally far between them, ``every`` [m]
+    at its ``speed`` [m/s].
 
-    Each snapshot is a picture where they are too far apart to be interpolated, and where nothing
-    travels.
-
-    Parameters
-    ----------
-    shown : ndarray, shape (n,)
-        Times of the snapshots [s].
-    speed : float
-        Speed of the train [m/s].
-    every : float
-        Travel of the train between two pictures [m].
+    Each snapshot, at a time of ``shown`` (n,) [s], is a picture where they are too far apart to be
+    interpolated, and where nothing travels.
     """
     apart = speed * float(np.diff(shown).mean())
     if speed == 0.0 or apart > SMOOTH_UP_TO:
