@@ -134,8 +134,8 @@ def chosen(times: np.ndarray, options: FilmOptions) -> np.ndarray:
 
 
 def times_of_pictures(shown: np.ndarray, speed: float, every: float) -> np.ndarray:
-    """Times of the pictures [s], such that the train goes equally far between them, ``every`` [m]
-    at its ``speed`` [m/s].
+    """Times of the pictures, two at least [s], such that the train goes equally far between them,
+    ``every`` [m] at its ``speed`` [m/s].
 
     Each snapshot, at a time of ``shown`` (n,) [s], is a picture where they are too far apart to be
     interpolated, and where nothing travels.
@@ -143,7 +143,7 @@ def times_of_pictures(shown: np.ndarray, speed: float, every: float) -> np.ndarr
     apart = speed * float(np.diff(shown).mean())
     if speed == 0.0 or apart > SMOOTH_UP_TO:
         return shown
-    return np.arange(shown[0], shown[-1] + _SAME, every / speed)
+    return np.arange(shown[0], shown[-1] + _SAME, min(every / speed, shown[-1] - shown[0]))
 
 
 def followed(data: FilmData, camera: str | None) -> list[int]:

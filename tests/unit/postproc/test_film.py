@@ -379,6 +379,8 @@ def test_pictures_are_equally_far_apart_along_the_track() -> None:
     times = animate.times_of_pictures(shown, 80.0, 1.0)
     np.testing.assert_allclose(80.0 * np.diff(times), 1.0)
     assert times[0] == 0.0 and times[-1] == pytest.approx(1.0)
+    # Farther than the train travels, the begin and the end.
+    np.testing.assert_allclose(animate.times_of_pictures(shown, 80.0, 1e4), [0.0, 1.0])
     # Too far apart to be interpolated, and nothing that travels.
     for speed in (120.0, 0.0):
         np.testing.assert_array_equal(animate.times_of_pictures(shown, speed, 1.0), shown)
