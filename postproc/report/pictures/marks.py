@@ -15,7 +15,7 @@ from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     GREY,
@@ -124,9 +124,12 @@ def _mark_parts(axes: Axes, results: Results, start: float, end: float, named: b
         axes.plot([], [], "|", color=GREY, markersize=5, label="dropper" if named else None)
 
 
-def still_marks(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    """Dashes at places ``x`` (n,) where ranges from ``low`` to ``high`` (n,) are too small for a
-    line that would be seen."""
+def draw_ranges(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """Ranges over the run from ``low`` to ``high`` (n,) at places ``x`` (n,) as upright lines, with
+    dashes where they are too small for a line that would be seen."""
+    drawn = thinned_ranges(low, high)
+    how: dict[str, Any] = {"color": COLOURS[0], "linewidth": 1.6, "label": "range over the run"}
+    uprights(axes, x[drawn], low[drawn], high[drawn], **how)
     still = high - low < 0.01 * (np.nanmax(high, initial=0.0) - np.nanmin(low, initial=0.0))
     axes.plot(x[still], high[still], "_", color=COLOURS[0], ms=3.0)
 
