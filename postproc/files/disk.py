@@ -69,27 +69,20 @@ class Elsewhere(OSError):
     file."""
 
 
-def reserve(handle: int, start: int, n_bytes: int) -> None:
-    """Claim ``n_bytes`` [bytes] on the disk behind an open file's end. Not collective.
+def reserve(file: h5py.File, n_bytes: int) -> None:
+    """Claim ``n_bytes`` [bytes] on the disk behind the end of an open file, whose path may name
+    another file by now. Not collective.
 
     HDF5 updates its tables in place and appends the data: if the disk fills up in between, the
-    tables point to data that are not there and the file is lost. Claimed space excludes that.
-
-    Parameters
-    ----------
-    handle : int
-        Descriptor of the file, open for writing; its path may name another file by now.
-    start : int
-        End of the file [bytes].
-    n_bytes : int
-        Size to claim [bytes].
+    tables point to data that are not there and the file is lost, and HDF5 crashes the interpreter
+    at its end. Claimed space excludes that.
 
     Raises
     ------
     NoRoom
     """
     try:
-        _claim(handle, start, n_bytes)
+        _claim(file.id.get_vfd_handle(), file.id.get_filesize(), n_bytes)
     except OSError as error:
         raise NoRoom(error.errno, error.strerror) from error
 

@@ -60,9 +60,7 @@ def _change(file: h5py.File, header: Header, n_steps: int) -> None:
         for name, value in {**header.attributes, "n_steps_planned": n_steps}.items()
         if name not in _KEPT
     }
-    # HDF5 crashes the interpreter at its end where a disk has refused a write.
-    room = MARGIN + sum(len(str(value).encode()) for value in known.values())
-    reserve(file.id.get_vfd_handle(), file.id.get_filesize(), room)
+    reserve(file, MARGIN + sum(len(str(value).encode()) for value in known.values()))
     # A file whose checksums were taken away gets none.
     has_sums = ATTRIBUTE_SUMS in file.attrs
     sealed = list(json.loads(text_of(file.attrs[ATTRIBUTE_SUMS]))) if has_sums else []
