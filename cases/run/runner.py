@@ -371,7 +371,7 @@ def _observers(
         fields = FieldRecorder(
             comm,
             order.out_dir / "fields.xdmf",
-            RecordedLine.of(problem.line, at_rest.mesh, at_rest.form.slope, at_rest.form.lateral),
+            RecordedLine(problem.line, at_rest.mesh, at_rest.form.slope, at_rest.form.lateral),
             every=recording.field_every,
             record=recording.fields,
             flush_every=flush_every,
