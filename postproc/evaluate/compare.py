@@ -48,10 +48,14 @@ _Evaluated = tuple[Results, stats.RunStatistics]
 
 
 def compare(*runs: Path | str, records: Sequence[Records | None] | None = None) -> str:
-    """A table of the figures of two or more runs, result folders or files, and of their
-    differences, as text. Not collective.
+    """A table of the figures of two or more runs and of their differences, as text. Not collective.
 
-    What ``guard.examined`` found in each is given as ``records``; None to examine them here.
+    Parameters
+    ----------
+    *runs : Path or str
+        Result folders or files.
+    records : sequence of Records or None, optional
+        Findings of ``guard.examined`` in each run, None to examine it here.
 
     Raises
     ------

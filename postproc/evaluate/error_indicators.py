@@ -119,12 +119,20 @@ def indicate(results: Results) -> Indicators:
 
 
 def step_error(force: np.ndarray, dt: float, method: Method) -> float:
-    """Estimated rms error [N] of a filtered force history (n,) [N] due to the time step ``dt`` [s]
-    of its ``method``. Not collective.
+    """Estimated rms error of a force history due to the time step [N]. Not collective.
 
     The method moves what has the frequency w to w (1 - E (w dt)^2) and takes w D(w dt) from its
     rate of growth, D being a damping ratio. Each component of the force is wrong by the product of
     both with the time for which what caused it is remembered.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n,)
+        Filtered contact force in the evaluation stretch [N].
+    dt : float
+        Time step [s].
+    method : Method
+        Time integration of the run.
     """
     deviation = float(force.std())
     # A filtered record needs few samples; a long one has more than a spectrum can use.

@@ -63,11 +63,20 @@ def judge(
     limits: Mapping[str, float],
     pantographs: Sequence[str],
 ) -> list[Criterion]:
-    """Every criterion of the books: of each pantograph, in the order of their names, then of the
-    run, book after book.
+    """Every criterion of the books: of each pantograph, then of the run, book after book.
 
-    ``observations`` are those of all quantities of the books, as ``quantities_of`` names them, and
-    ``limits`` those of the scene by keys of ``evaluation.limits``, in their units.
+    Parameters
+    ----------
+    books : sequence of RuleBook
+        Rule books.
+    observations : mapping
+        Observations of all quantities of the books, as ``quantities_of`` names them.
+    conditions : Conditions
+        Speed [km/h], supply, stops.
+    limits : mapping
+        Limits of the scene by keys of ``evaluation.limits``, in their units.
+    pantographs : sequence of str
+        Names of the pantographs in the order of tables.
     """
     found: list[Criterion] = []
     for book in books:

@@ -65,8 +65,15 @@ _MOST_MORE = 9
 
 
 def decimals_that_tell(value: float | None, limit: float | None, fewest: int) -> int:
-    """Decimals of a value and its limit in one unit with which different numbers print differently:
-    ``fewest`` where the two differ by enough, and of NaN and None."""
+    """Decimals of a value and its limit with which different numbers print differently.
+
+    Parameters
+    ----------
+    value, limit : float or None
+        Numbers in one unit; NaN and None are printed with ``fewest``.
+    fewest : int
+        Decimals where the two differ by enough [-].
+    """
     if value is None or limit is None or not math.isfinite(value) or not math.isfinite(limit):
         return fewest
     if value == limit:

@@ -75,9 +75,18 @@ def drop_filtered(file: h5py.File) -> None:
 def filtered_in(
     file: Any, shape: tuple[int, int], index: int | None = None
 ) -> tuple[np.ndarray, dict[str, Any]] | None:
-    """The filtered force (n, n_pantographs) [N], or (n,) of the one of an ``index``, and what its
-    filter is, of a result file or the tables of a march, whose forces have a ``shape``; None if
-    there is none that is valid, or one of an earlier version, which is to single precision."""
+    """The filtered force (n, n_pantographs) [N], or (n,) of one, and what its filter is; None if
+    there is none that is valid, or one of an earlier version, which is to single precision.
+
+    Parameters
+    ----------
+    file : object
+        Result file, or the tables of a march.
+    shape : tuple of int
+        Shape of the force of all steps.
+    index : int or None
+        Number of the pantograph; all if None.
+    """
     if PATH not in file:
         return None
     try:

@@ -175,8 +175,16 @@ class ResultFile:
     def append(
         self, blocks: Mapping[str, np.ndarray], line: LineRows, state: Mapping[str, Any] | None
     ) -> None:
-        """Append rows to growing datasets, ``blocks`` (rows, ...) by path and those of the line's
-        channels, and store a state to continue from in ``checkpoint``, unless it is None.
+        """Append rows to growing datasets and store a state to continue from.
+
+        Parameters
+        ----------
+        blocks : mapping
+            Arrays (rows, ...) by path in the file.
+        line : LineRows
+            Rows of the line's channels.
+        state : mapping or None
+            Contents of ``checkpoint``, None to leave it.
 
         Raises
         ------

@@ -70,9 +70,18 @@ def animate(
 ) -> Film:
     """Make ``film.mp4`` and ``film.gif`` in the folder of a run. Not collective.
 
-    ``records`` is what ``guard.examined`` found in the result file. With ``progress`` a bar shows
-    how far it is, if standard error is a terminal. Without ``shapes`` of the pantographs there are
-    schematics.
+    Parameters
+    ----------
+    folder : Path
+        Result folder; the films are written there.
+    options : FilmOptions
+        Times, line and size of the pictures.
+    records : Records or None
+        Findings of ``guard.examined`` in the result file.
+    progress : bool
+        Whether a bar shows how far it is, if standard error is a terminal.
+    shapes : sequence of Shape, optional
+        Shapes of the pantographs, None for schematics.
 
     Raises
     ------

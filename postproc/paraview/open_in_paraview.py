@@ -38,8 +38,18 @@ def write_script(
 ) -> list[Path]:
     """Write ``paraview/view.py`` and its data into the folder of a run. Not collective.
 
-    What is None is found here: what ``guard.examined`` found in the result file (``records``), a
-    factor of motions that fits, schematic shapes of pantographs, the look that shows the line best.
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    records : Records or None
+        Findings of ``guard.examined`` in the result file.
+    motion : float, optional
+        Factor by which motions are drawn larger, None for one that fits.
+    shapes : sequence of Shape, optional
+        Shapes of the pantographs, None for schematics.
+    look : View, optional
+        Point of view; None for the one that shows the line best.
 
     Raises
     ------

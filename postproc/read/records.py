@@ -46,9 +46,19 @@ class Records(NamedTuple):
 def table_faults(
     file: h5py.File, record: LineRecord, sizes: dict[str, int], most: int
 ) -> dict[str, str]:
-    """Faults of growing tables by path: missing, of the wrong type or of the wrong width, or with
-    more than ``most`` rows, which the run plans. The ``sizes`` of their columns are added to
-    those of dimensions by name."""
+    """Faults of growing tables by path: missing, of the wrong type or of the wrong width.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Open result file.
+    record : LineRecord
+        Which of the line's channels are recorded.
+    sizes : dict
+        Sizes of dimensions by name; those of the columns are added.
+    most : int
+        Number of rows that the run plans.
+    """
     faults: dict[str, str] = {}
     steps, energies, line = growing_tables(record)
     for tables in (steps, energies if is_there(file, "energy") else {}, line):
@@ -89,10 +99,22 @@ def scan(
     faults: dict[str, str],
     complete: tuple[list[int], str] | None = None,
 ) -> Records:
-    """Read all records, ``dt`` [s] apart, once, by blocks, and find the valid ones.
+    """Read all records once, by blocks, and find the valid ones.
 
-    ``about`` are valid root attributes, ``faults`` those from ``table_faults``, and ``complete``
-    are the counts that ``committed_rows`` found earlier, None to find them now.
+    Parameters
+    ----------
+    file : h5py.File
+        Open result file.
+    about : dict
+        Valid root attributes.
+    record : LineRecord
+        Which of the line's channels are recorded.
+    dt : float
+        Time between two records [s].
+    faults : dict
+        Faults from ``table_faults``.
+    complete : tuple, optional
+        Counts that ``committed_rows`` found earlier, None to find them now.
     """
     n_complete, fault = committed_rows(file) if complete is None else complete
     clauses = [f"{path} {clause}" for path, clause in faults.items()] + ([fault] if fault else [])

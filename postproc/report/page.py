@@ -146,9 +146,16 @@ def pdf(html: str) -> bytes:
 
 
 def shares(figures: Sequence[tuple[float, float]], headings: Sequence[float]) -> list[float]:
-    """Size of each figure over its usual one, so that few sheets end early, by tops and bottoms of
-    figures and tops of headings on an endless sheet that begins at the first heading [px of
-    CSS]. Not collective."""
+    """Size of each figure over its usual one, so that few sheets end early. Not collective.
+
+    Parameters
+    ----------
+    figures : sequence of tuple of float
+        Top and bottom of each figure in order, on an endless sheet that begins at the first heading
+        [px of CSS].
+    headings : sequence of float
+        Tops of the headings there [px of CSS].
+    """
     found = []
     at, last = 0.0, min(headings, default=0.0)  # on the sheet, on the endless one
     for top, bottom in figures:

@@ -84,11 +84,18 @@ class Study:
 def write_study(
     study: Study, out_dir: Path, rows: Sequence[Mapping[str, Any]], facts: Mapping[str, Any]
 ) -> list[Path]:
-    """Write ``study.html``, ``study.json`` and every figure as PNG and CSV into a folder that
-    exists. Not collective.
+    """Write ``study.html``, ``study.json`` and every figure as PNG and CSV. Not collective.
 
-    ``rows`` are figures of every run, for ``study.json``, with their units in their names;
-    ``facts`` is what is said of the study as a whole, such as its run time.
+    Parameters
+    ----------
+    study : Study
+        What was found.
+    out_dir : Path
+        Folder that exists.
+    rows : sequence of mapping
+        Figures of every run, for ``study.json``, with their units in their names.
+    facts : mapping
+        What is said of the study as a whole, such as its run time.
     """
     pictures: dict[str, bytes] = {}
     for one in study.figures:

@@ -157,8 +157,19 @@ def texts_table(
     title: str = "",
     note: str = "",
 ) -> StudyTable:
-    """A table of texts for people, with a title and a note above it. Columns of the numbers
-    ``right``, from 0, stand at the right."""
+    """A table of texts for people.
+
+    Parameters
+    ----------
+    heads : sequence of str
+        Heads of the columns, with units in brackets.
+    rows : sequence of sequence
+        Texts of the cells.
+    right : collection of int, optional
+        Numbers of the columns that stand at the right, from 0.
+    title, note : str, optional
+        What stands above the table.
+    """
     columns = [
         Column(str(number), head or " ", ">" if number in right else "")
         for number, head in enumerate(heads)

@@ -28,8 +28,19 @@ def summarise(
     criteria: list[Criterion],
     indicators: Indicators | None = None,
 ) -> dict[str, Any]:
-    """The content of ``summary.json``: plain Python values, NaN as None; estimated errors
-    (``indicators``) are found here if they are not given. Not collective."""
+    """The content of ``summary.json``: plain Python values, NaN as None. Not collective.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    statistics : RunStatistics
+        Its statistics.
+    criteria : list of Criterion
+        Judged criteria.
+    indicators : Indicators, optional
+        Estimated errors of the run; found here without them.
+    """
     attributes = results.attributes
     indicators = indicate(results) if indicators is None else indicators
     short = _short(results, statistics, criteria, indicators)

@@ -26,9 +26,16 @@ _OWN_KINDS = {
 
 
 def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:
-    """An HDF5 file all of whose tables lie in itself, open for reading ("r") or for changes ("r+"),
-    with further options of ``h5py.File``. A symbolic link is not followed, a pipe not waited
-    for.
+    """An HDF5 file all of whose tables lie in itself, open for reading or for changes.
+
+    Parameters
+    ----------
+    path : Path
+        A regular file; a symbolic link is not followed, a pipe not waited for.
+    mode : str, optional
+        "r" or "r+".
+    **options : object
+        Further arguments of ``h5py.File``.
 
     Raises
     ------

@@ -74,8 +74,18 @@ class FieldRecord:
         return self.parts is None and self.stretch is None and self.window is None
 
     def needed(self, blocks: list[Block], times: np.ndarray, n_nodes: int) -> np.ndarray:
-        """Nodes without which snapshots of ``chosen`` blocks cannot be made, (n_nodes,) bool. Of
-        successive ``times`` [s] the first and the last are enough."""
+        """Nodes without which snapshots cannot be made, (n_nodes,) bool.
+
+        Parameters
+        ----------
+        blocks : list of Block
+            Recorded blocks, see ``chosen``.
+        times : ndarray
+            Times of successive snapshots, of which the first and the last are enough
+            [s].
+        n_nodes : int
+            Number of nodes of the line.
+        """
         needed = np.zeros(n_nodes, dtype=bool)
         for block in blocks:
             first, count = block.range_over(*self.edges(times))

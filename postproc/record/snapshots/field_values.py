@@ -147,8 +147,17 @@ def _ends(height: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
 
 def curvature(x: np.ndarray, w: np.ndarray, slope: np.ndarray, breaks: np.ndarray) -> np.ndarray:
-    """d2w/dx2 at the nodes ``x`` (n,) of a wire of cubic elements, the mean of both sides of a node
-    [1/m], from deflections [m] and slopes (rows, n); at ``breaks`` further pieces begin."""
+    """d2w/dx2 at the nodes of a wire of cubic elements, the mean of both sides of a node [1/m].
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Places of the nodes [m].
+    w, slope : ndarray, shape (rows, n)
+        Deflections [m] and slopes [-].
+    breaks : ndarray
+        Nodes at which further pieces begin.
+    """
     length = np.diff(x)
     joined = np.ones(length.size)
     joined[breaks - 1] = 0.0

@@ -97,8 +97,19 @@ def _block_begin(name: str) -> bytes:
 def grids_of(
     slots: Slots, times: list[float], h5_name: str, offsets: Mapping[str, int]
 ) -> list[str]:
-    """The grids of a block at ``times`` [s], whose tables begin at ``offsets`` [B] by name in the
-    file ``h5_name``, relative to that of the text."""
+    """The grids of a block at ``times`` [s].
+
+    Parameters
+    ----------
+    slots : Slots
+        Layout of the block in the file.
+    times : list of float
+        Times of the snapshots [s].
+    h5_name : str
+        File of the numbers, relative to that of the text.
+    offsets : mapping
+        Place in that file at which each table of the block begins, by name [B].
+    """
     # Grids differ in numbers only: one text for all, into which these are put.
     moves = bool(np.ptp(slots.first) or np.ptp(slots.count))
     file, block = h5_name.replace("%", "%%"), slots.name.replace("%", "%%")

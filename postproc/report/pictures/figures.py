@@ -225,10 +225,17 @@ def legend_above(axes: Axes, columns: int = 8) -> Legend:
 
 def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
     """A picture as ``{name: file}``, PNG, SVG or JSON of Plotly by its suffix; empty if none can be
-    drawn, or if ``draw`` returns None.
+    drawn.
 
     A failure is logged and costs this picture alone. Results that are damaged, a `CatenaryError`,
     are not a failure of drawing and are raised.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, with its suffix.
+    draw : callable
+        Makes the figure, or returns None if there is nothing to show.
     """
     try:
         with own_style():
