@@ -64,8 +64,17 @@ class Fact(NamedTuple):
 
 
 def facts_of(problem: Problem, mesh: LineMesh, dropper_length: np.ndarray) -> dict[str, np.ndarray]:
-    """All facts of a run by name, (), (n_pantographs,) or (n_contact_wires,) each, from the
-    ``dropper_length`` (n_droppers,) at rest [m] beside problem and mesh. Not collective."""
+    """All facts of a run by name, (), (n_pantographs,) or (n_contact_wires,) each. Not collective.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of the run.
+    mesh : LineMesh
+        Mesh of the line.
+    dropper_length : ndarray, shape (n_droppers,)
+        Length of droppers at rest [m].
+    """
     from catenary.solver.effects.all_effects import simulated
 
     source = Derivation(problem, mesh, dropper_length, simulated(problem))

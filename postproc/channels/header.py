@@ -43,8 +43,17 @@ def wire_roles(line: Line) -> dict[str, str]:
 def line_datasets(
     line: Line, mesh: LineMesh, evaluation: tuple[float, float]
 ) -> dict[str, np.ndarray]:
-    """Datasets of ``/line``: masts, spans of the droppers, ranges, chains of nodes; ``evaluation``
-    is the stretch whose statistics are judged [m]. Not collective."""
+    """Datasets of ``/line``: masts, spans of the droppers, ranges, chains of nodes. Not collective.
+
+    Parameters
+    ----------
+    line : Line
+        The line.
+    mesh : LineMesh
+        Mesh of the line.
+    evaluation : tuple of float
+        Stretch whose statistics are judged, from and to [m].
+    """
     masts = line.support_positions
     dropper_x = mesh.x(mesh.droppers[:, 1])
     datasets = {
@@ -76,7 +85,19 @@ def static_datasets(
     elasticity: Elasticity,
 ) -> dict[str, np.ndarray]:
     """Datasets of ``/static``: droppers, profiles, registration and elasticity at rest, but not the
-    lengths to which droppers are cut. Not collective."""
+    lengths to which droppers are cut. Not collective.
+
+    Parameters
+    ----------
+    line : Line
+        The line.
+    mesh : LineMesh
+        Mesh of the line.
+    equilibrium : Equilibrium
+        The line at rest.
+    elasticity : Elasticity
+        Elasticity of the line at rest.
+    """
     contact = np.concatenate([mesh.wires[wire.name] for wire in line.wires_of(Role.CONTACT)])
     return {
         "static/dropper_force": equilibrium.dropper_force,

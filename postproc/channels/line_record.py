@@ -60,8 +60,13 @@ class LineRecord:
         return np.flatnonzero((x >= low - 1e-6) & (x <= high + 1e-6))
 
     def within(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """From and to of the window at each row, (rows,) each [m], of pantographs at ``position``
-        (rows, n_pantographs) [m]; None without a window."""
+        """From and to of the window at each row, (rows,) each [m]; None without a window.
+
+        Parameters
+        ----------
+        position : ndarray, shape (rows, n_pantographs)
+            Places of the pantographs along the track [m].
+        """
         if self.window is None:
             return None
         behind, ahead = self.window

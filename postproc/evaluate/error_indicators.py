@@ -223,10 +223,18 @@ def required_by_bending(
 ) -> float:
     """Frequency of the wave that runs ahead of the train on a wire whose bending carries it [Hz].
 
-    A pantograph that moves with the ``speed`` v [m/s] and feels w_0, ``felt`` in Hz, excites
-    w = w_0 + v k, ahead of itself with w^2 = (F k^2 + EI k^4) / m, from tension [N], bending
-    stiffness [N m2] and mass [kg/m]: there is such a wave at every speed. Damping, which lets what
-    dies out be longer, is left out.
+    A pantograph that moves with v and feels w_0 excites w = w_0 + v k, ahead of itself with
+    w^2 = (F k^2 + EI k^4) / m: there is such a wave at every speed. Damping, which lets what dies
+    out be longer, is left out.
+
+    Parameters
+    ----------
+    felt : float
+        Highest frequency that is felt at the pantograph [Hz].
+    speed : float
+        Speed of the train [m/s].
+    tension, bending_stiffness, mass_per_length : float
+        Tension, bending stiffness and mass per length of the wire [N], [N m2], [kg/m].
     """
     own = 2.0 * np.pi * felt
     roots = np.roots(
@@ -248,12 +256,18 @@ def required_by_bending(
 def resolved_frequency(
     length: float, tension: float, bending_stiffness: float, mass_per_length: float
 ) -> float:
-    """Highest frequency of a wave that elements of a ``length`` [m] carry with less than 1 % error
-    [Hz].
+    """Highest frequency of a wave that elements carry with less than 1 % error [Hz].
 
-    Free waves w_n = exp(i k n h) on an endless wire of equal elements against w^2 = (F k^2 + EI
-    k^4) / m, from tension [N], bending stiffness [N m2] and mass [kg/m]; the first wave number
-    whose frequency is wrong ends the search, at most that of two waves an element.
+    Free waves w_n = exp(i k n h) on an endless wire of equal elements against
+    w^2 = (F k^2 + EI k^4) / m; the first wave number whose frequency is wrong ends the search,
+    at most that of two waves an element.
+
+    Parameters
+    ----------
+    length : float
+        Length of an element [m].
+    tension, bending_stiffness, mass_per_length : float
+        Tension, bending stiffness and mass per length of the wire [N], [N m2], [kg/m].
     """
     h = np.array([length])
     stiffness = beam.stiffness(h, bending_stiffness, tension)[0]

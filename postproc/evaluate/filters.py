@@ -68,11 +68,17 @@ def low_pass(values: np.ndarray, dt: float, cut_off: float = CUT_OFF) -> np.ndar
 
 
 def contact_force(results: Results, index: int) -> np.ndarray:
-    """Contact force of the pantograph number ``index`` below 20 Hz, (n,) [N], as the file has it.
-    Not collective.
+    """Contact force of a pantograph below 20 Hz, (n,) [N], as the file has it. Not collective.
 
     It is filtered anew where the file has none, such as that of a run that is not done; the digits
     are the same.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    index : int
+        Number of the pantograph, from zero.
 
     Raises
     ------

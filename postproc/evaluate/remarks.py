@@ -27,6 +27,13 @@ def all_remarks(results: Results, indicators: Indicators) -> list[str]:
     """Sentences about everything that decides the results of a run numerically. Not collective.
 
     Summary, terminal, report, comparisons and studies all tell these.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    indicators : Indicators
+        Estimated errors of the run.
     """
     watched: list[str] = results.attributes.get("watched", {}).get("remarks", [])
     arms = results.registration()

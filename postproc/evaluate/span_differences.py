@@ -54,9 +54,15 @@ def span_sums(position: np.ndarray, force: np.ndarray, edges: np.ndarray) -> Spa
 
 
 def differences(first: SpanSums, second: SpanSums, paired: bool) -> Sequence[Difference] | None:
-    """Differences, second less first, of ``STATISTICS`` of two runs by their sums over spans; None
-    with too few spans. ``paired`` is whether both are of the same spans of a line, whose common
-    part then drops out."""
+    """Differences, second less first, of ``STATISTICS``; None with too few spans.
+
+    Parameters
+    ----------
+    first, second : SpanSums
+        Sums over the spans of each run.
+    paired : bool
+        Whether both are of the same spans of a line, whose common part then drops out.
+    """
     n, m = first.samples.size, second.samples.size
     if min(n, m) < _LEAST_SPANS or (paired and n != m):
         return None

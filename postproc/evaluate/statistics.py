@@ -129,8 +129,15 @@ def evaluate(results: Results) -> RunStatistics:
 
 
 def covers(position: np.ndarray, evaluation: tuple[float, float]) -> bool:
-    """Whether a pantograph's record, whose places (n,) ascend [m], runs through the whole stretch
-    [m], to within one step."""
+    """Whether a pantograph's record runs through the whole stretch, to within one step.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        Places of the pantograph, ascending [m].
+    evaluation : tuple of float
+        Stretch whose statistics are judged, from and to [m].
+    """
     if position.size < 2:
         return False
     step = float(np.diff(position).max())

@@ -50,8 +50,14 @@ def _length(file: h5py.File, path: str) -> int:
 
 
 def fault_to_continue(path: Path, time: float) -> str:
-    """Fault of a result file in which a run is to go on from ``time`` [s], as a clause; "" if none.
-    Not collective.
+    """Fault of a result file in which a run is to go on, as a clause; "" if none. Not collective.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the result file.
+    time : float
+        Time from which on it goes on [s].
 
     Raises
     ------

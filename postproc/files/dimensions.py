@@ -45,9 +45,16 @@ _SIZE = b"This is a netCDF dimension but not a netCDF variable. %10d"
 
 
 def describe(file: h5py.File, places: dict[str, np.ndarray]) -> None:
-    """Name the dimensions of all tables of a new file, whose root group has its attributes already;
-    ``places`` are those of the recorded columns along the track (recorded,) [m], by what a
-    column stands for."""
+    """Name the dimensions of all tables that are there. The root group has its attributes already.
+
+    Parameters
+    ----------
+    file : h5py.File
+        New result file.
+    places : dict
+        Places along the track of the recorded columns, (recorded,), by what a column stands
+        for [m].
+    """
     time = _table(file, "time")
     h5ds.set_scale(time, b"time")
     _describe(time, channels.TIME.unit, channels.TIME.meaning)

@@ -19,8 +19,17 @@ _SLOTS = ("0", "1")
 
 
 def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarray]) -> None:
-    """Store the extremes (2, columns) of the first ``n_rows`` steps by channel in place of the
-    older of the two kept."""
+    """Store the extremes of the first ``n_rows`` steps in place of the older of the two kept.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Result file, open for writing.
+    n_rows : int
+        Number of steps that the extremes cover.
+    extremes : mapping
+        Smallest and largest values, (2, columns), by channel.
+    """
     group = file.require_group(GROUP)
     counts = [_rows_of(group[slot]) if slot in group else -1 for slot in _SLOTS]
     place = group.require_group(_SLOTS[int(np.argmin(counts))])

@@ -35,8 +35,16 @@ CHANGED = ("line/evaluation_range",)
 
 
 def extend_run(path: Path, header: Header, n_steps: int) -> None:
-    """Turn a result file into that of a run of ``n_steps`` interrupted where it has ended, with the
-    ``header`` of the run with its later end.
+    """Turn a result file into that of a run of ``n_steps`` interrupted where it has ended.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the result file.
+    header : Header
+        Header of the run with its later end.
+    n_steps : int
+        Number of steps up to the later end.
 
     Raises
     ------

@@ -77,8 +77,15 @@ def new_part(path: Path) -> Path:
 
 
 def remove_stale(folder: Path, names: Iterable[str] = OWN_FILES[1:]) -> None:
-    """Remove files that an earlier run or report left in a folder; all but the result file without
-    their ``names``."""
+    """Remove files that an earlier run or report left.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    names : iterable of str, optional
+        The files; all but the result file without it.
+    """
     for name in names:
         try:
             (folder / name).unlink(missing_ok=True)

@@ -311,8 +311,15 @@ COUNTS = Table(
 
 
 def constant_tables(wires: Iterable[str], breaks: Iterable[str]) -> dict[str, Table]:
-    """All tables of a file that are written once, but the facts, by the names of its wires and of
-    those wires that have several pieces (``breaks``)."""
+    """All tables of a file that are written once, but the facts.
+
+    Parameters
+    ----------
+    wires : iterable of str
+        Names of the wires.
+    breaks : iterable of str
+        Names of the wires of several pieces.
+    """
     tables = dict(CONSTANTS)
     for name in wires:
         meaning = f"wires of {name}: numbers of nodes"
@@ -344,8 +351,15 @@ def fact_tables() -> dict[str, Table]:
 def growing_tables(
     record: LineRecord, train: channels.TrainLayout | None = None
 ) -> tuple[dict[str, Channel], dict[str, Channel], dict[str, Channel]]:
-    """Tables that grow by rows: of the steps, the energies and the line's channels, clocks first;
-    of all trains' channels without a ``train``."""
+    """Tables that grow by rows: of the steps, the energies and the line's channels, clocks first.
+
+    Parameters
+    ----------
+    record : LineRecord
+        Which of the line's channels are recorded.
+    train : channels.TrainLayout, optional
+        Train whose channels are recorded, None for all channels.
+    """
     of_train = {f"channels/{c.name}": c for c in channels.train_channels(train)}
     of_line = {f"line_channels/{name}": channels.CHANNELS[name] for name in record.names}
     energies = {f"energy/{c.name}": c for c in channels.ENERGIES.values()}

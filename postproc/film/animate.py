@@ -134,11 +134,19 @@ def chosen(times: np.ndarray, options: FilmOptions) -> np.ndarray:
 
 
 def times_of_pictures(shown: np.ndarray, speed: float, every: float) -> np.ndarray:
-    """Times of the pictures, two at least [s], such that the train goes equally far between them,
-    ``every`` [m] at its ``speed`` [m/s].
+    """Times of the pictures, two at least, such that the train goes equally far between them.
 
-    Each snapshot, at a time of ``shown`` (n,) [s], is a picture where they are too far apart to be
-    interpolated, and where nothing travels.
+    Each snapshot is a picture where they are too far apart to be interpolated, and where nothing
+    travels.
+
+    Parameters
+    ----------
+    shown : ndarray, shape (n,)
+        Times of the snapshots [s].
+    speed : float
+        Speed of the train [m/s].
+    every : float
+        Travel of the train between two pictures [m].
     """
     apart = speed * float(np.diff(shown).mean())
     if speed == 0.0 or apart > SMOOTH_UP_TO:

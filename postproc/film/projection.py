@@ -108,10 +108,22 @@ class Picture:
 
     @classmethod
     def of(cls, view: View, data: FilmData, roof: float, width: float, aspect: float) -> Picture:
-        """Frame of a run, from the train's ``roof`` [m] to above the wires; from above, from side
-        to side.
+        """Frame of a run, from the train's roof to above the wires; from above, from side to side.
 
         From behind lengths are not seen: one metre of height is one metre of the picture.
+
+        Parameters
+        ----------
+        view : View
+            Direction from which the run is seen.
+        data : FilmData
+            Line and motion of the run.
+        roof : float
+            Height of the train's roof [m].
+        width : float
+            Length of line in the picture [m].
+        aspect : float
+            Width of the picture over its height.
         """
         low, high = roof - 1.0, float(data.points[:, 2].max()) + 0.6
         if view is View.PLAN:
@@ -124,11 +136,17 @@ class Picture:
         return cls(view, width, aspect, low, high)
 
     def scale(self, data: FilmData, extremes: np.ndarray, motion: float | None) -> Scale:
-        """The scale that fills it, with the ``extremes`` (2, 3) of the motion [m] of
-        `Snapshots.extremes`.
+        """The scale that fills it.
 
-        Without a factor of motions (``motion``) the largest motion fills a share of the room
-        between the wires, and nothing is drawn larger that hardly moves.
+        Parameters
+        ----------
+        data : FilmData
+            Data of the film.
+        extremes : ndarray, shape (2, 3)
+            Smallest and largest motion [m], see `Snapshots.extremes`.
+        motion : float or None
+            Factor of motions; if None, the largest motion fills a share of the room between the
+            wires, and nothing is drawn larger that hardly moves.
         """
         plan = self.view is View.PLAN
         axes = {View.SIDE: [2], View.PLAN: [1]}.get(self.view, [1, 2])

@@ -191,11 +191,17 @@ class Scenery:
         return View.SIDE
 
     def beside(self, time: float, frame: Frame) -> dict[str, Places]:
-        """Places of the parts beside the line at a ``time`` [s], with the line's ``frame`` at that
-        time.
+        """Places of the parts beside the line at a time.
 
         A head that presses on a wire is drawn where the wire is, which is drawn between its nodes;
         the arms below it give way in proportion.
+
+        Parameters
+        ----------
+        time : float
+            Time [s].
+        frame : Frame
+            The line at that time.
         """
         data, row = self.data, self.data.row_at(time)
         position, height = data.position[row], data.rest_height(data.position[row])
@@ -255,8 +261,13 @@ def _line_part(name: str, data: FilmData, snapshots: Snapshots) -> LinePart:
 
 
 def coaches(position: np.ndarray) -> np.ndarray:
-    """From and to of the coaches along the track, (n, 2) [m], as many as carry pantographs at
-    ``position`` (n_pantographs,) [m]."""
+    """From and to of the coaches along the track, (n, 2) [m], as many as carry the pantographs.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n_pantographs,)
+        Places of the pantographs along the track [m].
+    """
     front = float(position.max()) + AHEAD
     n = 1 + int((front - float(position.min())) // (COACH + GAP))
     begin = front - (COACH + GAP) * np.arange(n)

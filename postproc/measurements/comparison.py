@@ -59,6 +59,13 @@ _NEAR_SUPPORT = 10.0
 def compare_with(results: Results, passage: Passage) -> Comparison:
     """Compare a run with a measured passage. Not collective.
 
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    passage : Passage
+        What was measured, and how.
+
     Raises
     ------
     InputError

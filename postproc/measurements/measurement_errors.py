@@ -20,9 +20,21 @@ BIASES = 3.0
 def errors_of(
     found: Alignment, name: str, run: RunForce, passage: Passage, bias: float
 ) -> Iterator[Finding]:
-    """Errors of positions, of the force, and of the description's filter, of the pantograph
-    ``name`` whose force in the ``run`` a measured one was aligned with; ``bias`` is the stated
-    deviation of a constant error of the force [N]. Not collective."""
+    """Errors of positions, of the force, and of the description's filter. Not collective.
+
+    Parameters
+    ----------
+    found : Alignment
+        Alignment of the measured force.
+    name : str
+        Name of the pantograph.
+    run : RunForce
+        Its force in the run.
+    passage : Passage
+        The measured passage.
+    bias : float
+        Stated deviation of a constant error of the force [N].
+    """
     if found.shift.differs(0.0, SHIFT):
         shift, way = found.shift, "far along the track" if found.shift.value > 0 else "far back"
         by = f"{abs(shift.value):.2f} m too {way} (+- {shift.deviation:.2g} m)"

@@ -119,8 +119,15 @@ def uplifts_table(found: Comparison) -> StudyTable:
 
 
 def write(folder: Path, found: Comparison) -> list[Path]:
-    """Write page, tables, JSON and pictures of a comparison into a folder, which is made if it is
-    not there; returns the files. Not collective."""
+    """Write page, tables, JSON and pictures into a folder; returns the files. Not collective.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder, which is made if it is not there.
+    found : Comparison
+        Comparison of a run with a measured passage.
+    """
     # A text does without Matplotlib.
     from catenary.postproc.report.pictures import overlays
     from catenary.postproc.report.pictures.figures import painted

@@ -21,8 +21,20 @@ _CELLS = {1: "Polyvertex", 2: "Polyline", 4: "Quadrilateral"}
 
 
 def write(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
-    """Write the parts beside the line at the times of the snapshots into an existing folder;
-    returns the XDMF file of each part by its name. Not collective.
+    """Write the parts beside the line at the times of the snapshots. Not collective.
+
+    Parameters
+    ----------
+    scenery : Scenery
+        Scenery of the run.
+    snapshots : Snapshots
+        Snapshots of the line.
+    folder : Path
+        Existing folder to which the files go.
+
+    Returns
+    -------
+    The XDMF file of each part by its name.
 
     Raises
     ------

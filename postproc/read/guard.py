@@ -38,8 +38,12 @@ with file:
 
 
 def examined(path: Path) -> Records | None:
-    """Valid records of a result file, or of the folder that holds it as ``run.h5``; None if there
-    is no file.
+    """Valid records of a result file; None if there is no file.
+
+    Parameters
+    ----------
+    path : Path
+        Result file, or the folder that holds it as ``run.h5``.
 
     Raises
     ------

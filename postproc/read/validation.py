@@ -117,9 +117,19 @@ def _shown(value: Any) -> str:
 def table_values(
     file: h5py.File, path: str, declared: Table, sizes: dict[str, int]
 ) -> tuple[np.ndarray | None, str]:
-    """The values of the table at a path of an open file as it is declared, and an empty text; or
-    None and its fault. ``sizes`` of dimensions by name are those of earlier tables, to which
-    those of the table are added."""
+    """The values of a table and an empty text, or None and its fault.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Open result file.
+    path : str
+        Path of the table in the file.
+    declared : Table
+        Declaration of the table.
+    sizes : dict
+        Sizes of dimensions by name; those of the table are added.
+    """
     try:
         values = np.asarray(file[path][()])
     except (*HDF5_ERRORS, MemoryError):

@@ -164,9 +164,14 @@ class Recorder(FileObserver[ResultFile]):
         self._is_done = outcome == DONE
 
     def close(self, performance: Mapping[str, Any] | None = None) -> None:
-        """Write what is known at the very end as root attributes and close the file;
-        ``performance`` has figures such as ``phase_wall_s``, which rank 0 alone needs.
-        Collective."""
+        """Write what is known at the very end as root attributes and close the file. Collective.
+
+        Parameters
+        ----------
+        performance : mapping, optional
+            Figures such as ``phase_wall_s``, ``march_wall_s`` and ``inner_iterations``,
+            which rank 0 alone needs.
+        """
         if not self._broken:
             self._guarded(lambda: self._close(performance or {}), self._failed)
 

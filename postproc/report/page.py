@@ -116,10 +116,14 @@ _CLOSE = 60.0
 
 
 def pdf(html: str) -> bytes:
-    """The text of a ``page`` as PDF on A4, with page numbers and bookmarks; what is folded away
-    there is not printed. Not collective.
+    """A page as PDF on A4, with page numbers and bookmarks. Not collective.
 
     A figure that just misses the rest of a sheet is printed smaller, and does not leave it white.
+
+    Parameters
+    ----------
+    html : str
+        What ``page`` returned; what is folded away there is not printed.
 
     Raises
     ------

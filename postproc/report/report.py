@@ -162,15 +162,21 @@ def write_report(
 
 
 def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
-    """Write ``summary.json`` of a run alone into a folder that exists; returns the verdict as
-    ``Report``. Not collective.
+    """Write ``summary.json`` of a run alone; returns the verdict as ``Report``. Not collective.
 
     Files of an earlier report are removed: they may tell of a run that has gone on since.
+
+    Parameters
+    ----------
+    result_path : Path or str
+        Result file or its folder.
+    out_dir : Path or str
+        Folder that exists.
 
     Raises
     ------
     InputError
-        If ``result_path`` is no result file, nor its folder.
+        If ``result_path`` is no result file.
     """
     with Results(result_path) as results:
         statistics = stats.evaluate(results)
@@ -183,7 +189,15 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
 
 
 def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:
-    """Pictures of a run in their order, each with the function that draws it. Not collective."""
+    """Pictures of a run in their order, each with the function that draws it. Not collective.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    statistics : RunStatistics
+        Its statistics.
+    """
     run = EvaluatedRun(results, statistics, criteria_of(results, statistics))
     for entry in SECTIONS:
         if entry.applies(run):

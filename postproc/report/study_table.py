@@ -231,7 +231,12 @@ def json_text(record: Mapping[str, Any]) -> str:
 
 def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     """Lines for below a table, each remark once with the runs that it is of; none without remarks.
-    ``runs`` are the name of each run and its remarks."""
+
+    Parameters
+    ----------
+    runs : iterable of tuple
+        Name of each run, and its remarks.
+    """
     named = list(runs)
     names: dict[str, list[str]] = {}
     for name, remarks in named:

@@ -273,8 +273,14 @@ def _known(key: str, names: list[str], known: Mapping[str, object]) -> None:
 
 
 def book_of(table: Any, where: str) -> RuleBook:
-    """The rule book of a table, such as a TOML file holds; sentences about it begin with ``where``,
-    the name of the source.
+    """The rule book of a table, such as a TOML file holds.
+
+    Parameters
+    ----------
+    table : object
+        Contents of the TOML file.
+    where : str
+        Name of the source, with which sentences about it begin.
 
     Raises
     ------

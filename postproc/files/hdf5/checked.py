@@ -47,8 +47,18 @@ def put_array(group: h5py.Group, name: str, values: Any) -> h5d.DatasetID:
 
 
 def set_attribute(place: h5py.HLObject | h5d.DatasetID, name: str, value: Any) -> None:
-    """Store an attribute of a file, group or dataset, text with a fixed length in UTF-8; one that
-    is there is replaced so that no moment is without it."""
+    """Store an attribute, text with a fixed length in UTF-8; one that is there is replaced so that
+    no moment is without it.
+
+    Parameters
+    ----------
+    place : h5py.HLObject or h5py.h5d.DatasetID
+        File, group or dataset, or the latter's identifier.
+    name : str
+        Name of the attribute.
+    value : object
+        Text or a number.
+    """
     if isinstance(value, str):
         text = value.encode()
         kind, stored = _text_type(max(1, len(text)))
@@ -125,8 +135,14 @@ def seal_attributes(place: h5py.HLObject, names: Iterable[str] | None = None) ->
 
 
 def broken_seals(place: h5py.HLObject, values: Mapping[str, Any]) -> list[str]:
-    """Names of sealed attributes of ``place`` that are missing among its ``values`` by name, or
-    have another value.
+    """Names of attributes whose value is not the sealed one or that are missing.
+
+    Parameters
+    ----------
+    place : h5py.HLObject
+        File, group or dataset with sealed attributes.
+    values : mapping
+        Name -> attribute of ``place``.
 
     Raises
     ------

@@ -32,9 +32,19 @@ class Chunk(NamedTuple):
 def chunks_of(
     table: Mapping[str, tuple[Channel, int]], n_steps: int, rows_per_flush: int, every: int
 ) -> dict[str, Chunk]:
-    """Shapes of the chunks by path, of a ``table`` of channels and numbers of columns by path, in a
-    run of ``n_steps`` after step 0 that appends ``rows_per_flush`` at once and a row of the
-    line's channels ``every`` so many steps."""
+    """Shapes of the chunks by path.
+
+    Parameters
+    ----------
+    table : mapping
+        Path -> channel and columns.
+    n_steps : int
+        Steps that are planned after step 0.
+    rows_per_flush : int
+        Steps of a flush.
+    every : int
+        Steps between two rows of the line's channels.
+    """
     # Rows that are appended at once, and that are planned.
     line = max(1, rows_per_flush // every), n_steps // every + 1
     step = rows_per_flush, n_steps + 1
@@ -59,8 +69,19 @@ def room_of(
     rows: int,
     record: LineRecord,
 ) -> int:
-    """Most bytes that an append of ``rows`` steps adds to a file, in whole chunks [B]; ``table``
-    and ``chunks`` as of ``chunks_of``."""
+    """Most bytes that an append adds to a file, in whole chunks [B].
+
+    Parameters
+    ----------
+    table : mapping of str to tuple
+        Channel and number of columns by path in the file.
+    chunks : mapping of str to Chunk
+        Shapes of chunks by path.
+    rows : int
+        Number of steps that are appended.
+    record : LineRecord
+        Recorded part of the line.
+    """
     total = 0
     for path, (channel, columns) in table.items():
         shape = chunks[path]

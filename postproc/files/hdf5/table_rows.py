@@ -130,8 +130,17 @@ _SLICE = 1 << 18
 
 
 def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:
-    """Rows 0 to ``n_rows`` in order, in slices of ``BLOCK_BYTES`` of ``n_columns`` that start at
-    multiples of ``step``, the rows of a chunk."""
+    """Rows 0 to ``n_rows`` in order, in slices that start at multiples of ``step``.
+
+    Parameters
+    ----------
+    n_rows : int
+        Rows of the table.
+    n_columns : int
+        Columns that are read, 8 bytes each.
+    step : int, optional
+        Rows of a chunk.
+    """
     rows = max(1, int(BLOCK_BYTES / (8 * max(n_columns, 1))))
     rows = max(step, rows - rows % step)
     for start in range(0, n_rows, rows):

@@ -80,8 +80,17 @@ class FieldsFile:
         self.is_published = False
 
     def make(self, numbers: np.ndarray) -> None:
-        """Write a file without a snapshot, under another name until ``publish``; ``numbers`` are
-        those of the snapshots to come, counted from the start of the run. OSError if that fails."""
+        """Write a file without a snapshot, under another name until ``publish``.
+
+        Parameters
+        ----------
+        numbers : ndarray
+            Numbers of the snapshots to come, counted from the start of the run.
+
+        Raises
+        ------
+        OSError
+        """
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._made_as = new_part(self.path)
         self._plan(numbers)
@@ -96,8 +105,14 @@ class FieldsFile:
         self._handle = os.open(self._made_as, os.O_RDWR)
 
     def resume(self, numbers: np.ndarray, start_time: float) -> bool:
-        """Continue the file, whose snapshots from ``start_time`` [s] on are replaced; False if it
-        is not as it was. ``numbers`` as of ``make``.
+        """Continue the file from ``start_time`` [s] on; False if it is not as it was.
+
+        Parameters
+        ----------
+        numbers : ndarray
+            Numbers of the snapshots to come, counted from the start of the run.
+        start_time : float
+            Time from which on snapshots are replaced [s].
 
         Raises
         ------

@@ -12,8 +12,13 @@ MOST_POINTS, _BINS = 20_000, 5_000
 
 
 def thinned(y: np.ndarray) -> np.ndarray | slice:
-    """Points of a curve that are drawn, as an index for ``x`` and ``y``: of its values ``y`` (n,)
-    in order; NaN leaves a gap where all values of a bin are NaN."""
+    """Points of a curve that are drawn, as an index for ``x`` and ``y``.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        Values of the curve in order; NaN leaves a gap where all values of a bin are NaN.
+    """
     return slice(None) if y.size <= MOST_POINTS else _extremes(y)
 
 

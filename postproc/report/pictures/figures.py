@@ -102,10 +102,14 @@ class ShownFigure(Figure):
 
 
 def new_figure(height: float) -> Figure:
-    """An empty figure of the report's width and a ``height`` [inch], its layout computed when it is
-    drawn.
+    """An empty figure of the report's width, its layout computed when it is drawn.
 
     The computation costs as much as the drawing; ``stacked`` does without.
+
+    Parameters
+    ----------
+    height : float
+        Height of the figure [inch].
     """
     figure = ShownFigure(figsize=(WIDTH, height), dpi=_RESOLUTION, layout="constrained")
     FigureCanvasAgg(figure)
@@ -113,12 +117,20 @@ def new_figure(height: float) -> Figure:
 
 
 def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, list[Axes]]:
-    """A figure of the report's width and a ``height`` [inch] with ``n`` panels one below the other,
-    and the panels.
+    """A figure of the report's width with ``n`` panels one below the other, and the panels.
 
     The layout is given, not computed: there is room for one line of title and legend above each
-    panel and for tick labels of six characters at its left. ``shared`` panels have one x axis,
-    whose labels stand below the last one, and one scale of y.
+    panel and for tick labels of six characters at its left.
+
+    Parameters
+    ----------
+    height : float
+        Height of the figure [inch].
+    n : int
+        Number of panels, at least 1.
+    shared : bool, optional
+        Whether the panels have one x axis, whose labels stand below the last one, and one scale of
+        y.
     """
     figure = ShownFigure(figsize=(WIDTH, height), dpi=_RESOLUTION)
     FigureCanvasAgg(figure)
@@ -156,26 +168,59 @@ def curve(
     width: float = 1.2,
     **how: Any,
 ) -> None:
-    """Draw a curve with the colour of a number, that of a pantograph or curve.
+    """Draw a curve with the colour of a number.
 
-    ``look`` is Matplotlib's format of markers and line, ``width`` that of the line [pt]; further
-    properties of Matplotlib's line, ``how``, win. Without a ``label`` no legend names it.
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    x, y : array_like, shape (n,)
+        Points of the curve, in the units of the panel.
+    number : int
+        Number of the pantograph or curve, which has its colour.
+    label : str, optional
+        Entry of the legend; none without it.
+    look : str, optional
+        Matplotlib's format of markers and line.
+    width : float, optional
+        Width of the line [pt].
+    **how : dict
+        Further properties of Matplotlib's line, which win.
     """
     usual: dict[str, Any] = {"color": colour(number), "linewidth": width, "ms": 3.5, "label": label}
     axes.plot(x, y, look, **(usual | how))
 
 
 def uprights(axes: Axes, x: np.ndarray, low: Any, high: Any, **how: Any) -> None:
-    """Draw upright lines at places ``x`` (n,) from ``low`` to ``high``, (n,) or (), as one curve: a
-    picture has hundreds, and a PDF takes each apart. ``how`` are properties of Matplotlib's
-    line."""
+    """Draw upright lines as one curve: a picture has hundreds, and a PDF takes each apart.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    x : ndarray, shape (n,)
+        Places of the lines, in the unit of the panel.
+    low, high : array_like, shape (n,) or ()
+        Their ends.
+    **how : dict
+        Properties of Matplotlib's line.
+    """
     ends = np.broadcast_arrays(low, high, np.nan, x)[:3]
     axes.plot(np.repeat(x, 3), np.stack(ends, axis=1).ravel(), solid_capstyle="butt", **how)
 
 
 def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
-    """Give a panel labels of its axes, with units in brackets, a light grid, few ticks and no box,
-    and a title at its left."""
+    """Give a panel labels, a light grid, few ticks and no box.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    x_label, y_label : str
+        Quantity of each axis, with its unit in brackets.
+    title : str, optional
+        Title above the panel, at its left.
+    """
     for axis, most in zip((axes.xaxis, axes.yaxis), _MOST_TICKS, strict=True):
         if isinstance(axis.get_major_locator(), AutoLocator):
             axis.set_major_locator(FewTicks(most, steps=STEPS))
@@ -206,10 +251,16 @@ def log_log(axes: Axes) -> None:
 
 
 def legend_above(axes: Axes, columns: int = 8) -> Legend:
-    """Legend above the axes at the right, where no curve can pass, with so many ``columns`` at
-    most.
+    """Legend above the axes at the right, where no curve can pass.
 
     Where it is too long to stand beside the title, ``png`` makes room for it.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel, whose curves have labels.
+    columns : int, optional
+        Entries side by side, at most.
     """
     return axes.legend(
         loc="lower right",

@@ -87,8 +87,15 @@ def _mark_arrivals(axes: Axes, evaluated_from: float, facts: Mapping[str, Any]) 
 
 @own_style()
 def force_spectrum(results: Results, lengths: Mapping[str, float]) -> Figure:
-    """Power spectral density of the unfiltered force of each pantograph in the evaluation stretch,
-    with the passing frequencies of ``lengths`` by which the line repeats [m], by name."""
+    """Power spectral density of the unfiltered force of each pantograph in the evaluation stretch.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    lengths : mapping
+        Lengths by which the line repeats [m], by name; the speed over each is a frequency.
+    """
     start, end = results.evaluation
     figure, (axes,) = stacked(3.4, 1)
     speed = results.fact("speed")
@@ -128,8 +135,16 @@ def _look(pantograph: int) -> str:
 def contact_height(
     results: Results, heights: Mapping[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 ) -> Figure:
-    """Height of the contact point and its gradient along the track: of ``heights``, places [m],
-    heights [m] and gradients [-], (n,) each, by name of the pantograph."""
+    """Height of the contact point and its gradient along the track.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    heights : mapping
+        Places [m], heights [m] and gradients [-], ndarrays of shape (n,), by name of the
+        pantograph.
+    """
     figure, (height, gradient) = stacked(4.8, 2)
     start, end = travelled(results)
     for axes, number, factor, label in (

@@ -44,7 +44,17 @@ _MOST_ARMS = 60
 @own_style()
 def arm_uplift(results: Results, statistics: RunStatistics, limit: float) -> Figure:
     """Uplift at the evaluated arms as the train passes, or over time after a blow, and the largest
-    uplift of every arm, with the allowed one (``limit`` [m], NaN without)."""
+    uplift of every arm.
+
+    Parameters
+    ----------
+    results : Results
+        Results of the run.
+    statistics : RunStatistics
+        Its statistics.
+    limit : float
+        Largest uplift that is allowed [m]; NaN without a limit.
+    """
     supports = statistics.supports
     figure, (passing, along) = stacked(4.8, 2)
     _passing_train(passing, results, statistics)
@@ -284,8 +294,15 @@ _ALLOWED = 10.0
 
 @own_style()
 def draw_temperatures(rests: Sequence[LineAtTemperature], path: Path) -> None:
-    """Write a picture of a line at several temperatures, a PNG or SVG file by its suffix. Not
-    collective."""
+    """Write a picture of a line at several temperatures. Not collective.
+
+    Parameters
+    ----------
+    rests : sequence of LineAtTemperature
+        Line at rest at each temperature.
+    path : Path
+        PNG or SVG file, by its suffix.
+    """
     found = [rest for rest in rests if not rest.why_not]
     names = [wire.name for wire in found[0].wires if wire.ends] if found else []
     figure = new_figure(2.6 * (len(names) + 1))

@@ -88,10 +88,20 @@ def panels_along_track(
 def mark_line(
     axes: Axes, results: Results, start: float, end: float, *, named: bool = True
 ) -> None:
-    """Mark the line in a panel along the track from ``start`` to ``end`` [m].
+    """Mark the line in a panel along the track.
 
-    Supports are lines, droppers ticks at the bottom, the evaluation stretch is shaded; the legend
-    names these marks if ``named``, of several panels that of the first one.
+    Supports are lines, droppers ticks at the bottom, the evaluation stretch is shaded.
+
+    Parameters
+    ----------
+    axes : Axes
+        Panel.
+    results : Results
+        Results of the run.
+    start, end : float
+        From and to of the panel [m].
+    named : bool, optional
+        Whether its legend names these marks; of several panels the first one does.
     """
     low, high = results.evaluation
     label = "evaluation stretch" if named else None

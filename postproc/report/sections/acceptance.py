@@ -120,7 +120,13 @@ def _margin(one: Criterion) -> str:
 
 def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
     """Sentences on the smallest margin of what the run finds, and on verdicts that errors and the
-    start could turn."""
+    start could turn.
+
+    Parameters
+    ----------
+    run : EvaluatedRun
+        Run with its criteria.
+    """
     judged = [
         (one, label)
         for one, label in zip(run.criteria, labels(run.criteria), strict=True)

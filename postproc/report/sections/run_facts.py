@@ -69,8 +69,16 @@ def _checks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
 
 
 def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) -> Section:
-    """Effects that were simulated, and effects that were not, with the reasons; ``costs`` are a
-    sentence on what each costs and changes, by its name, and the study that measured them."""
+    """Effects that were simulated, and effects that were not, with the reasons.
+
+    Parameters
+    ----------
+    run : EvaluatedRun
+        Run.
+    costs : tuple, optional
+        By names of effects a sentence on what each costs and changes, and the study that measured
+        them.
+    """
     about, (cost_of, study) = run.results.attributes, costs
     heads = ["effect", "what it is", "why", *(["what it costs and changes"] if cost_of else [])]
     on, off = (
@@ -95,8 +103,15 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
 
 
 def signatures(text: str | None, run: EvaluatedRun) -> Section:
-    """Commands to make the run again, and room for signatures; ``text`` is what stands in
-    ``INPUT``, None if there is no such file."""
+    """Commands to make the run again, and room for signatures.
+
+    Parameters
+    ----------
+    text : str or None
+        What stands in ``INPUT``, None if there is no such file.
+    run : EvaluatedRun
+        Run.
+    """
     about = run.results.attributes
     name, version = next(iter(about["versions"].items()))
     rows = [["program", f"{name} {version}; all versions above"]]
