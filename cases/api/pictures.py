@@ -106,7 +106,7 @@ class Pictures:
         complaints = [one.complaint for one in evaluated.pantographs]
         if all(complaints):
             raise InputError(f"the run has no picture of statistics. {complaints[0]}")
-        return figures.fitted(force_pictures.force_statistics(self._results(), evaluated))
+        return figures.fitted(force_pictures.force_statistics(evaluated))
 
     def histogram(self) -> Figure:
         """Share of time [%] of the contact force below 20 Hz in bins of 10 N.

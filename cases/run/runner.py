@@ -47,7 +47,7 @@ from catenary.postproc.files.filtered_force import ForceFilter
 from catenary.postproc.files.own_files import RUN_FILE, remove_stale
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.record.run_watch import RunWatch, StripWatch, watch_cadence, watch_inputs
+from catenary.postproc.record.run_watch import RunWatch, StripWatch
 from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.problem.problem import OFF, Problem
@@ -371,7 +371,7 @@ def _observers(
         fields = FieldRecorder(
             comm,
             order.out_dir / "fields.xdmf",
-            RecordedLine.of(problem.line, at_rest.mesh, at_rest.form.slope, at_rest.form.lateral),
+            RecordedLine(problem.line, at_rest.mesh, at_rest.form.slope, at_rest.form.lateral),
             every=recording.field_every,
             record=recording.fields,
             flush_every=flush_every,
@@ -401,7 +401,7 @@ def _observers(
         first.append(StripWatch(half_lengths))
     if excited is not None:
         first += excited.watching(at_rest)
-    watch = RunWatch(comm, watch_inputs(at_rest, excited is None), watch_cadence(dt))
+    watch = RunWatch(comm, at_rest, excited is None)
     return [*first, progress, watch, recorder], recorder, watch
 
 

@@ -31,7 +31,7 @@ from catenary.postproc.files.filtered_force import PATH as FILTERED
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
+from catenary.postproc.record.run_watch import RunWatch
 from catenary.postproc.report.summary import short_summary
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import N_LANES, SharedLine, why_alone
@@ -364,7 +364,7 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineA
     keeper, dt = Keeper(), problem.numerics.dt
     try:
         with March(alone(), *rest) as march:
-            watch = RunWatch(alone(), watch_inputs(rest, True), watch_cadence(dt))
+            watch = RunWatch(alone(), rest)
             outcome = march.run([watch, keeper])
     except CatenaryError as error:
         return Marched(number, str(error))

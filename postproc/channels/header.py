@@ -11,24 +11,10 @@ import numpy as np
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.facts import FACTS
 
 if TYPE_CHECKING:
     from catenary.solver.statics.elasticity import Elasticity
     from catenary.solver.statics.form_finding.equilibrium import Equilibrium
-
-REQUIRED_ATTRIBUTES = (
-    "case",
-    "title",
-    "n_dofs",
-    "system",
-    "rules",
-    "versions",
-    "config",
-    "wires",
-    "effects_on",
-    "effects_off",
-)
 
 
 @dataclass(frozen=True)
@@ -37,10 +23,9 @@ class Header:
 
     Attributes
     ----------
-    attributes : at least ``REQUIRED_ATTRIBUTES``; text and numbers are stored as they are, lists
-        and tables as JSON. ``system`` is a key of ``postproc.standards``, ``rules`` lists names of
-        rule books, and whole ones; ``effects_on`` and ``effects_off`` are lists of (name, title,
-        reason).
+    attributes : as `RunAttributes`; text and numbers are stored as they are, lists and tables as
+        JSON. ``system`` is a key of ``postproc.standards``, ``rules`` lists names of rule books,
+        and whole ones; ``effects_on`` and ``effects_off`` are lists of (name, title, reason).
     datasets : path in the file -> array, from ``line_datasets`` and ``static_datasets``
     facts : name -> value of all facts, from ``facts_of``
     """
@@ -48,12 +33,6 @@ class Header:
     attributes: Mapping[str, Any]
     datasets: Mapping[str, np.ndarray]
     facts: Mapping[str, np.ndarray]
-
-    def __post_init__(self) -> None:
-        missing = [name for name in REQUIRED_ATTRIBUTES if name not in self.attributes]
-        missing += [name for name in FACTS if name not in self.facts]
-        if missing:
-            raise ValueError(f"the head of a result file lacks {', '.join(missing)}")
 
 
 def wire_roles(line: Line) -> dict[str, str]:

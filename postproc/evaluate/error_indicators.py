@@ -20,7 +20,7 @@ from catenary.meshgen.slowest_wave import bends
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS, WIRE
 from catenary.postproc.evaluate import filters
-from catenary.postproc.evaluate.statistics import covers, has_a_period
+from catenary.postproc.evaluate.statistics import evaluated_force
 from catenary.postproc.read.results import Results
 from catenary.solver.model import beam
 from catenary.solver.problem.integrator_parameters import (
@@ -43,6 +43,8 @@ _WAVE_NUMBERS = 400
 _SPECTRUM, _SAMPLED_HZ = 100_000, 1000.0
 # Of longer ones the spectrum is the mean over stretches of so many values, some minutes.
 _STRETCH = 1 << 18
+# Of fewer values there is no spectrum.
+_FEWEST = 8
 # Waves of two elements belong to the lower branch, whatever rounding says.
 _ZONE = np.pi * (1.0 + 1e-9)
 _NEEDED = (
@@ -96,17 +98,12 @@ def indicate(results: Results) -> Indicators:
     if any(np.isnan(value) for values in known.values() for value in values.values()):
         return Indicators(error, error, np.nan, np.nan, (_EARLIER,))
     wires = _contact_wires(results)
-    start, end = results.evaluation
     for p in range(n):
-        position = results.column("contact_position", p)
-        within = (position >= start) & (position <= end)
-        long = np.count_nonzero(within) >= 8 and has_a_period(within, results.dt)
-        if not (long and covers(position, (start, end))):
-            continue
-        del position
         try:
-            filtered = filters.contact_force(results, p)[within]
+            filtered = evaluated_force(results, p)[1]
         except InputError:  # the statistics say so
+            continue
+        if filtered.size < _FEWEST:
             continue
         deviation[p] = filtered.std()
         # Of several contact wires the one that remembers longest.

@@ -6,8 +6,8 @@ Each function is named in ``standards.quantities``; its values are in the unit t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -63,24 +63,10 @@ def wire_at_rest(results: Results) -> WireAtRest | None:
     x = x[in_stretch(x, *results.evaluation)]
     if not x.size:
         return None
-    heights = np.array([_height_at(profile, x) for profile in profiles])
+    heights = np.array([profile.height_at(x) for profile in profiles])
     lowest = np.nanmin(heights, axis=0)
     y, sweep = _lateral(profiles, x, lowest)
     return WireAtRest(x, lowest, y, sweep)
-
-
-def _pieces(profile: ContactProfile) -> Iterator[slice]:
-    ends = [0, *profile.breaks.tolist(), profile.x.size]
-    yield from (slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True) if b > a)
-
-
-def _height_at(profile: ContactProfile, x: np.ndarray) -> np.ndarray:
-    """Height of the lowest piece of a wire [m], infinite where it has none."""
-    height = np.full(x.size, np.inf)
-    for piece in _pieces(profile):
-        own = np.interp(x, profile.x[piece], profile.height[piece], np.inf, np.inf)
-        height = np.minimum(height, own)
-    return height
 
 
 def _lateral(
@@ -91,7 +77,7 @@ def _lateral(
     for profile in profiles:
         if profile.y is None:
             return None, None
-        for piece in _pieces(profile):
+        for piece in profile.pieces():
             at, y, height = profile.x[piece], profile.y[piece], profile.height[piece]
             met = (at >= x[0]) & (at <= x[-1])
             met &= height <= np.interp(at, x, lowest) + _SAME_HEIGHT
@@ -111,12 +97,14 @@ class Observation:
     values : by the name of a pantograph, or under "" for the run; NaN where its record gives none
     unjudged : why values are NaN, or judge nothing, by the same names
     absent : why runs of this scene have no such quantity, empty if they have
+    so_far : why values may still grow, empty if they are final
     note : remark on the quantity where it is a limit
     """
 
     values: Mapping[str, float] = field(default_factory=dict)
     unjudged: Mapping[str, str] = field(default_factory=dict)
     absent: str = ""
+    so_far: str = ""
     note: str = ""
 
 
@@ -142,6 +130,11 @@ class ObservedRun:
 
 
 Observe = Callable[[ObservedRun], Observation]
+# Quantities that grow from step to step, as pantographs pass.
+_OF_PASSAGES = {
+    *("arm_uplift", "strip_place", "contact_wire_tension"),
+    *("dropper_force_max", "dropper_compression", "dropper_slackenings"),
+}
 
 
 def observe(
@@ -150,7 +143,14 @@ def observe(
     """The quantities of ``names`` of a run, from its ``results`` and ``statistics``. Not
     collective."""
     run = ObservedRun(results, statistics)
-    return {name: OBSERVED[name](run) for name in dict.fromkeys(names)}
+    found = {name: OBSERVED[name](run) for name in dict.fromkeys(names)}
+    if all(p.covered for p in statistics.pantographs):
+        return found
+    why = "the record does not cover the evaluation stretch"
+    return {
+        name: replace(one, so_far=why) if name in _OF_PASSAGES else one
+        for name, one in found.items()
+    }
 
 
 def _one(value: float, missing: str = "") -> Observation:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -35,16 +36,16 @@ def slack_droppers(results: Results) -> dict[str, dict[str, int]]:
     x = results.line("dropper_x")
     evaluated = in_stretch(x, *results.evaluation)
     leading, trailing = np.zeros(x.size, dtype=bool), np.zeros(x.size, dtype=bool)
-    every = results.line_record.every
-    for part, force in results.blocks("dropper_force"):
+    last = np.full(results.n_steps + 1, -np.inf)
+    if results.n_pantographs > 1:
+        positions = (results.column("contact_position", p) for p in range(results.n_pantographs))
+        last = functools.reduce(np.minimum, positions)
+    last = last[:: results.line_record.every]
+    for part, columns, force in results.written_blocks("dropper_force"):
         slack = force <= 0.0
-        steps = slice(part.start * every, (part.stop - 1) * every + 1, every)
-        last = results.rows("contact_position", steps).min(axis=1)
-        after = last[:, None] >= x[None, :] - AHEAD
-        if results.n_pantographs == 1:
-            after[:] = False
-        leading |= (slack & ~after).any(axis=0)
-        trailing |= (slack & after).any(axis=0)
+        after = last[part, None] >= x[columns] - AHEAD
+        leading[columns] |= (slack & ~after).any(axis=0)
+        trailing[columns] |= (slack & after).any(axis=0)
     groups = {"mid": evaluated & mid_span(results), "all": evaluated}
     return {
         name: {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,22 +21,6 @@ _FELT_HZ = 40.0
 # Phase of the contact's own motion in a step beyond which its hops are not resolved [rad].
 _RESOLVED = 0.5
 _SIDES = ("start", "end")
-
-
-class _Contact(NamedTuple):
-    """A head on its contact: mass [kg], stiffness [N/m], step [s]."""
-
-    mass: float
-    stiffness: float
-    dt: float
-
-    @property
-    def omega(self) -> float:
-        return math.sqrt(self.stiffness / self.mass)
-
-    @property
-    def frequency(self) -> float:
-        return self.omega / (2.0 * math.pi)
 
 
 def all_remarks(results: Results, indicators: Indicators) -> list[str]:
@@ -221,26 +204,27 @@ def _about_contact(results: Results) -> list[str]:
     for mass, stiffness in zip(results.facts_of("touching_mass"), stiffnesses, strict=True):
         # Without a train nothing touches the line.
         if math.isfinite(mass) and math.isfinite(stiffness) and stiffness > 0.0:
-            head = _Contact(float(mass), float(stiffness), results.fact("shortest_step"))
-            found |= dict.fromkeys(_about_head(head))
+            head = _about_head(float(mass), float(stiffness), results.fact("shortest_step"))
+            found |= dict.fromkeys(head)
     return list(found)
 
 
-def _about_head(head: _Contact) -> list[str]:
-    contact = stiffness_words(float(f"{head.stiffness:.3g}"))
+def _about_head(mass: float, stiffness: float, dt: float) -> list[str]:
+    """Remarks on a head of a mass [kg] on its contact [N/m] at a step [s]."""
+    contact, omega = stiffness_words(float(f"{stiffness:.3g}")), math.sqrt(stiffness / mass)
+    frequency = omega / (2.0 * math.pi)
     begin = (
-        f"A head of {head.mass:.3g} kg on a contact of {contact} has a resonance at "
-        f"{head.frequency:.3g} Hz"
+        f"A head of {mass:.3g} kg on a contact of {contact} has a resonance at {frequency:.3g} Hz"
     )
     result = []
-    if head.frequency < _FELT_HZ:
+    if frequency < _FELT_HZ:
         result.append(
             f"{begin}, inside the 20 Hz band: contact.stiffness_N_per_m is part of the "
             "result. Figures of other contact stiffnesses cannot be compared with these."
         )
-    if head.omega * head.dt > _RESOLVED:
+    if omega * dt > _RESOLVED:
         result.append(
-            f"{begin}: a step of {1e3 * head.dt:g} ms does not resolve its hops. If the head loses "
+            f"{begin}: a step of {1e3 * dt:g} ms does not resolve its hops. If the head loses "
             "contact they feed the line, with forces several times too large, and the loss of "
             "contact counts steps, not losses. Take a smaller numerics.dt_s, a contact that damps, "
             "or numerics.newmark_gamma = 0.6 with newmark_beta = 0.3025."

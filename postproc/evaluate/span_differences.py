@@ -44,12 +44,11 @@ def span_sums(position: np.ndarray, force: np.ndarray, edges: np.ndarray) -> Spa
 
     Spans without a sample are left out.
     """
+    n_spans = max(edges.size - 1, 0)
     which = np.searchsorted(edges, position, side="right") - 1
-    inside = (which >= 0) & (which < edges.size - 1)
+    inside = (which >= 0) & (which < n_spans)
     which, force = which[inside], force[inside]
-    sums = [
-        np.bincount(which, weights, edges.size - 1) for weights in (None, force, np.square(force))
-    ]
+    sums = [np.bincount(which, weights, n_spans) for weights in (None, force, np.square(force))]
     there = sums[0] > 0
     return SpanSums(*(one[there].astype(float) for one in sums))
 

@@ -41,6 +41,7 @@ class PantographStatistics:
     histogram_edges : (n + 1,) edges of the bins of the 20 Hz force [N]
     histogram_percent : (n,) share of time in each bin [%]
     complaint : why there are no statistics, a sentence
+    covered : whether its record covers the evaluation stretch
     unjudged : why no criterion is judged by statistics that there are, a sentence
     """
 
@@ -59,6 +60,7 @@ class PantographStatistics:
     histogram_edges: np.ndarray = field(default_factory=lambda: np.zeros(1))
     histogram_percent: np.ndarray = field(default_factory=lambda: np.zeros(0))
     complaint: str = ""
+    covered: bool = True
     unjudged: str = ""
 
 
@@ -142,14 +144,36 @@ def covers(position: np.ndarray, evaluation: tuple[float, float]) -> bool:
     return bool(position[0] <= evaluation[0] + step and position[-1] >= evaluation[1] - step)
 
 
-def has_a_period(within: np.ndarray, dt: float) -> bool:
-    """Whether records, ``dt`` [s] apart, that are in the stretch by ``within`` (n,) bool last for a
-    period of the filter, without which there are no statistics."""
-    return _time(within, dt) >= 1.0 / filters.CUT_OFF
+class Uncovered(InputError):
+    """The record of a pantograph does not cover the evaluation stretch."""
 
 
-def _time(within: np.ndarray, dt: float) -> float:
-    return max(np.count_nonzero(within) - 1, 0) * dt
+def evaluated_force(results: Results, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Records (n,) bool of a pantograph in the evaluation stretch, and its force there below 20 Hz
+    [N].
+
+    Raises
+    ------
+    InputError
+        If there are no statistics of it, with the reason; `Uncovered` if that is a part that its
+        record lacks.
+    """
+    start, end = results.evaluation
+    position = results.column("contact_position", number)
+    if not covers(position, (start, end)):
+        seen = f"{position[0]:.0f} to {position[-1]:.0f} m" if position.size else "nothing"
+        raise Uncovered(
+            f"its record covers {seen}, the evaluation stretch is {start:.0f} to {end:.0f} m"
+        )
+    within = (position >= start) & (position <= end)
+    del position
+    time = max(np.count_nonzero(within) - 1, 0) * results.dt
+    if time < 1.0 / filters.CUT_OFF:
+        raise InputError(
+            f"it passes the evaluation stretch within {1e3 * time:.3g} ms, less than a period of "
+            f"the 20 Hz filter ({1e3 / filters.CUT_OFF:g} ms)"
+        )
+    return within, filters.contact_force(results, number)[within]
 
 
 def contact_statistics(
@@ -253,27 +277,9 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
         return PantographStatistics(
             name, complaint="No statistics of contact forces: the line is excited without a train."
         )
-    start, end = results.evaluation
-    position = results.column("contact_position", number)
-    if not covers(position, (start, end)):
-        seen = f"{position[0]:.0f} to {position[-1]:.0f} m" if position.size else "nothing"
-        return PantographStatistics(
-            name,
-            complaint=f"No statistics of the {_noun(name)}: its record covers {seen}, the "
-            f"evaluation stretch is {start:.0f} to {end:.0f} m.",
-        )
-    within = (position >= start) & (position <= end)
-    del position
-    if not has_a_period(within, results.dt):
-        return PantographStatistics(
-            name,
-            complaint=f"No statistics of the {_noun(name)}: it passes the evaluation stretch "
-            f"within {1e3 * _time(within, results.dt):.3g} ms, less than a period of the 20 Hz "
-            f"filter ({1e3 / filters.CUT_OFF:g} ms).",
-        )
     try:
+        within, filtered = evaluated_force(results, number)
         force = results.column("contact_force", number)
-        filtered = filters.contact_force(results, number)[within]
         return PantographStatistics(
             name=name,
             **_of_force(force, filtered, within, results.dt),
@@ -281,7 +287,9 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
             unjudged=_unjudged(_noun(name), force[within], results),
         )
     except InputError as error:
-        return PantographStatistics(name, complaint=f"No statistics of the {_noun(name)}: {error}.")
+        complaint = f"No statistics of the {_noun(name)}: {error}."
+        covered = not isinstance(error, Uncovered)
+        return PantographStatistics(name, complaint=complaint, covered=covered)
 
 
 def _unjudged(noun: str, force: np.ndarray, results: Results) -> str:

@@ -108,17 +108,9 @@ def verdict(criteria: Sequence[Criterion]) -> bool | None:
     return None if not counted or any(c.passed is None for c in counted) else True
 
 
-def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
-    """Sentence on the books that judge a run, and the number of criteria with each verdict, of
-    several books by each one too.
-
-    Parameters
-    ----------
-    criteria : sequence of Criterion
-        Judged criteria.
-    supply : str
-        Supply, a key of ``SYSTEMS``.
-    """
+def judged_by(results: Results, criteria: Sequence[Criterion]) -> str:
+    """Sentence on the books and the supply that judge a run, and the number of criteria with each
+    verdict, of several books by each one too."""
     titles = list(dict.fromkeys(c.title for c in criteria))
     judged = [c for c in criteria if c.passed is not None]
     counts = f"{_share(judged)} criteria passed"
@@ -130,7 +122,7 @@ def verdict_sentence(criteria: Sequence[Criterion], supply: str) -> str:
     if titles[1:]:
         titles = [f"{title} ({_share(c for c in judged if c.title == title)})" for title in titles]
         titles = [", ".join(titles[:-1]), titles[-1]]
-    return f"{' and '.join(titles)} ({SYSTEMS[supply]}): {counts}"
+    return f"{' and '.join(titles)} ({SYSTEMS[results.attributes['system']]}): {counts}"
 
 
 def _share(judged: Iterable[Criterion]) -> str:
@@ -185,6 +177,9 @@ class _Judge:
                 because, absent = str(why), True
         if not because:
             passed = bool(_MET[rule.relation](value, limit))
+            # A value that may still grow is beyond a limit for good, and below it for now.
+            if observation.so_far and passed != (rule.relation in (">", ">=")):
+                passed, because = None, observation.so_far
         return Criterion(
             rule.title + (f", {name}" if self.several and name else ""),
             value,
@@ -264,8 +259,3 @@ def criteria_of(results: Results, statistics: RunStatistics) -> list[Criterion]:
         one if one.absent else replace(one, value=nan, limit=nan, passed=None, because=_NO_TRAIN)
         for one in found
     ]
-
-
-def judged_by(results: Results, criteria: list[Criterion]) -> str:
-    """Sentence on books, editions and supply that judge a run, with counts of verdicts."""
-    return verdict_sentence(criteria, results.attributes["system"])

@@ -69,27 +69,20 @@ class Elsewhere(OSError):
     file."""
 
 
-def reserve(handle: int, start: int, n_bytes: int) -> None:
-    """Claim ``n_bytes`` [bytes] on the disk behind an open file's end. Not collective.
+def reserve(file: h5py.File, n_bytes: int) -> None:
+    """Claim ``n_bytes`` [bytes] on the disk behind the end of an open file, whose path may name
+    another file by now. Not collective.
 
     HDF5 updates its tables in place and appends the data: if the disk fills up in between, the
-    tables point to data that are not there and the file is lost. Claimed space excludes that.
-
-    Parameters
-    ----------
-    handle : int
-        Descriptor of the file, open for writing; its path may name another file by now.
-    start : int
-        End of the file [bytes].
-    n_bytes : int
-        Size to claim [bytes].
+    tables point to data that are not there and the file is lost, and HDF5 crashes the interpreter
+    at its end. Claimed space excludes that.
 
     Raises
     ------
     NoRoom
     """
     try:
-        _claim(handle, start, n_bytes)
+        _claim(file.id.get_vfd_handle(), file.id.get_filesize(), n_bytes)
     except OSError as error:
         raise NoRoom(error.errno, error.strerror) from error
 
@@ -254,7 +247,8 @@ def appears_whole(path: Path) -> Iterator[Path]:
         yield partial
         os.replace(partial, path)
     except BaseException:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # where nothing can be written the first error tells why
+            partial.unlink(missing_ok=True)
         raise
 
 
@@ -313,7 +307,7 @@ def write_into(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
     return [folder / name for name in content]
 
 
-def unwritten(path: Path, error: OSError) -> RunBroken:
+def unwritten(path: Path, error: Exception) -> RunBroken:
     """The error for the user where a file or folder could not be written."""
     return RunBroken(
         f"writing {path} failed ({reason(error)}): {remedy(error)}; what was written before stays "

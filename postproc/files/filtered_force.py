@@ -55,7 +55,7 @@ def store_filtered(file: h5py.File, force: ForceFilter, dt: float) -> None:
         return
     values = force.filtered(record[...], dt)
     try:
-        reserve(file.id.get_vfd_handle(), file.id.get_filesize(), values.nbytes + MARGIN)
+        reserve(file, values.nbytes + MARGIN)
     except NoRoom:
         logger.warning("the disk has no room for the filtered contact force: it is left out")
         return

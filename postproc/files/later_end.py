@@ -14,11 +14,10 @@ import h5py
 
 from catenary.base.errors import RunBroken
 from catenary.postproc.channels.header import Header
-from catenary.postproc.files.disk import appears_whole, as_attribute, open_to_write
+from catenary.postproc.files.disk import MARGIN, appears_whole, as_attribute, opened, reserve
 from catenary.postproc.files.disk_errors import reason
 from catenary.postproc.files.hdf5.checked import (
     ATTRIBUTE_SUMS,
-    FORMAT_BOUNDS,
     put_array,
     seal_arrays,
     seal_attributes,
@@ -55,7 +54,7 @@ def extend_run(path: Path, header: Header, n_steps: int) -> None:
     try:
         with appears_whole(path) as made_as:
             shutil.copyfile(path, made_as, follow_symlinks=False)
-            with open_to_write(made_as, "r+", libver=FORMAT_BOUNDS) as file:
+            with opened(made_as, "r+") as file:
                 _change(file, header, n_steps)
     except (OSError, RuntimeError) as error:
         raise RunBroken(
@@ -64,15 +63,20 @@ def extend_run(path: Path, header: Header, n_steps: int) -> None:
 
 
 def _change(file: h5py.File, header: Header, n_steps: int) -> None:
+    known = {
+        name: as_attribute(value)
+        for name, value in {**header.attributes, "n_steps_planned": n_steps}.items()
+        if name not in _KEPT
+    }
+    reserve(file, MARGIN + sum(len(str(value).encode()) for value in known.values()))
     # A file whose checksums were taken away gets none.
     has_sums = ATTRIBUTE_SUMS in file.attrs
     sealed = list(json.loads(text_of(file.attrs[ATTRIBUTE_SUMS]))) if has_sums else []
     if BEGUN_FOR not in file.attrs:
         set_attribute(file, BEGUN_FOR, file.attrs["n_steps_planned"])
         sealed.append(BEGUN_FOR)
-    known = {name: value for name, value in header.attributes.items() if name not in _KEPT}
-    for name, value in {**known, "n_steps_planned": n_steps}.items():
-        set_attribute(file, name, as_attribute(value))
+    for name, value in known.items():
+        set_attribute(file, name, value)
     if has_sums:
         seal_attributes(file, sealed)
     set_attribute(file, "outcome", INTERRUPTED)

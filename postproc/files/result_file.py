@@ -164,7 +164,7 @@ class ResultFile:
             self._growing = {name: self._file[name] for name in table}
             set_attribute(self._file, "outcome", RUNNING)
             self._file.flush()
-            self._reserve()
+            reserve(self._file, self._room)
         except InputError:
             self._file.close()
             raise
@@ -203,7 +203,7 @@ class ResultFile:
         if state is not None:
             self._store(state)
         self._file.flush()
-        self._reserve()
+        reserve(self._file, self._room)
         if not self._begun:
             os.replace(self._made_as, self._path)
             self._begun = True
@@ -285,10 +285,6 @@ class ResultFile:
         """Write all that waits, before what follows; not needed until the file has its name."""
         if self._begun:
             self._file.flush()
-
-    def _reserve(self) -> None:
-        handle = self._file.id.get_vfd_handle()
-        reserve(handle, self._file.id.get_filesize(), self._room)
 
 
 def _table(

@@ -134,7 +134,7 @@ def chosen(times: np.ndarray, options: FilmOptions) -> np.ndarray:
 
 
 def times_of_pictures(shown: np.ndarray, speed: float, every: float) -> np.ndarray:
-    """Times of the pictures, such that the train goes equally far between them.
+    """Times of the pictures, two at least, such that the train goes equally far between them.
 
     Each snapshot is a picture where they are too far apart to be interpolated, and where nothing
     travels.
@@ -151,7 +151,7 @@ def times_of_pictures(shown: np.ndarray, speed: float, every: float) -> np.ndarr
     apart = speed * float(np.diff(shown).mean())
     if speed == 0.0 or apart > SMOOTH_UP_TO:
         return shown
-    return np.arange(shown[0], shown[-1] + _SAME, every / speed)
+    return np.arange(shown[0], shown[-1] + _SAME, min(every / speed, shown[-1] - shown[0]))
 
 
 def followed(data: FilmData, camera: str | None) -> list[int]:

@@ -47,6 +47,8 @@ _BESIDE_VALUE, _ABOVE_VALUE = 0.03, 0.014
 _SEEN_BEHIND, _SEEN_AHEAD = 10.0, 65.0
 # Distance from the picture up to which parts are drawn [m]; half the length of lines across [m].
 _NEAR, _ACROSS = 12.0, 50.0
+# Numbers below a scale of colours are so far apart at least, as a share of it.
+_APART = 0.15
 # Faces of a box from dark to light: left, floor, rear, front, roof, right.
 _FACES = ("#c3c8ce", "#c3c8ce", "#ccd1d7", "#ccd1d7", "#eceef1", "#dde1e6")
 _STYLE = {"font.size": 15, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
@@ -139,7 +141,9 @@ class Drawing:
             shown = ScalarMappable(Normalize(bottom, top), ramp(stops))
             bar = self.figure.colorbar(shown, cax=axes, orientation="horizontal")
             bar.outline.set_visible(False)  # type: ignore[operator]
-            bar.set_ticks(np.unique([bottom, 0.0, top]).tolist())
+            # Zero has no number where that would touch the number of an end.
+            apart = min(-bottom, top) > _APART * (top - bottom)
+            bar.set_ticks([bottom, 0.0, top] if apart else [bottom, top])
             axes.tick_params(labelsize=13, length=4)
             write(left, 0.965, label, fontsize=14)
         if len(bars) > 1:

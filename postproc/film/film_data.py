@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters
+from catenary.postproc.read.line_of_run import ContactProfile
 from catenary.postproc.read.results import Results
 from catenary.solver.waves.excitation import Excitation, MovingForce, excitation_of_facts
 
-# A place that is that near to the end of a wire is on it [m].
-_NEAR = 1e-6
 # Defects and incidents after which a dropper is not there.
 _GONE = ("missing_dropper", "dropper_break")
 
@@ -28,7 +26,7 @@ class FilmData:
     speed : of the train [m/s]
     points : (n_nodes, 3) nodes of the line at rest [m]
     wires : name -> nodes in order of x
-    roles : name -> role of each wire, in the order of the line
+    profiles : name -> each contact wire at rest, in the order of the line
     elements : name -> (n, 2) nodes of the wire's elements
     droppers : (n_droppers, 2) nodes
     gone : (n_droppers,) time from which a dropper is not there, infinite of those that stay [s]
@@ -45,7 +43,7 @@ class FilmData:
     speed: float
     points: np.ndarray
     wires: dict[str, np.ndarray]
-    roles: dict[str, Role]
+    profiles: dict[str, ContactProfile]
     elements: dict[str, np.ndarray]
     droppers: np.ndarray
     gone: np.ndarray
@@ -66,7 +64,7 @@ class FilmData:
     @property
     def contacts(self) -> list[str]:
         """Names of the contact wires, in the order of the line."""
-        return [name for name, role in self.roles.items() if role is Role.CONTACT]
+        return list(self.profiles)
 
     @property
     def contact(self) -> str:
@@ -92,22 +90,17 @@ class FilmData:
 
     def contacts_at(self, x: float) -> list[str]:
         """Names of the contact wires at a place along the track, all beyond their ends [m]."""
-        there = [n for n in self.contacts if self._is_there(n, np.array([x]))[0]]
+        there = [
+            name for name, own in self.profiles.items() if np.isfinite(own.height_at(np.array(x)))
+        ]
         return there or self.contacts
 
     def _at_rest(self, x: np.ndarray) -> np.ndarray:
         """Heights of the contact wires (n_wires, n) [m], inf where a wire is absent; extrapolated
         where all are."""
-        chains = [self.points[self.wires[name]] for name in self.contacts]
-        there = np.array([self._is_there(name, x) for name in self.contacts])
-        heights = np.array([np.interp(x, at[:, 0], at[:, 2]) for at in chains])
-        return np.where(there | ~there.any(axis=0), heights, np.inf)
-
-    def _is_there(self, wire: str, x: np.ndarray) -> np.ndarray:
-        """Whether an element of a wire is at places along the track, bool, shape as ``x``."""
-        low, high = self.points[self.elements[wire], 0].T
-        which = np.clip(np.searchsorted(high, x - _NEAR), None, high.size - 1)
-        return (x >= low[which] - _NEAR) & (x <= high[which] + _NEAR)
+        heights = np.array([own.height_at(x) for own in self.profiles.values()])
+        beyond = [np.interp(x, own.x, own.height) for own in self.profiles.values()]
+        return np.where(np.isinf(heights).all(axis=0), beyond, heights)
 
     def row_at(self, time: float) -> int:
         """The record nearest to a time [s]."""
@@ -132,7 +125,7 @@ def film_data(results: Results) -> FilmData:
         results.fact("speed"),
         points,
         results.wires(),
-        results.roles,
+        results.contact_profiles(),
         results.elements(),
         droppers,
         _gone(results, points[droppers[:, 1], 0]),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -14,7 +13,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from catenary.base.errors import InputError
+from catenary.postproc.files.disk import appears_whole, unwritten
 
 # A GIF has pictures of this width [px], and so many a second at most.
 _GIF_WIDTH, _GIF_RATE = 800, 12.5
@@ -49,22 +48,14 @@ def write(
 
     Raises
     ------
-    InputError
+    RunBroken
         If a file cannot be written.
     """
-    parts = [path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") for path in (mp4, gif)]
     try:
-        for part in parts:  # a link that was put there would be written through
-            part.unlink(missing_ok=True)
-        count = _encode(pictures, size, rate, parts, colours)
-        for part, path in zip(parts, (mp4, gif), strict=True):
-            os.replace(part, path)
+        with appears_whole(mp4) as film, appears_whole(gif) as picture:
+            return _encode(pictures, size, rate, (film, picture), colours)
     except OSError as error:
-        raise InputError(f"the film cannot be written to {mp4.parent}: {error}") from error
-    finally:
-        for part in parts:
-            part.unlink(missing_ok=True)
-    return count
+        raise unwritten(mp4, error) from error
 
 
 def _encode(
@@ -112,8 +103,8 @@ def _command(size: tuple[int, int], rate: float, palette: Path, parts: Sequence[
         "-f", "rawvideo", "-pix_fmt", "rgb0", "-s", f"{size[0]}x{size[1]}", "-r", f"{rate:g}",
         "-i", "-", "-i", str(palette), "-filter_complex", ways,
         "-map", "[a]", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20",
-        "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(parts[0]),
-        "-map", "[g]", "-loop", "0", str(parts[1]),
+        "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(parts[0]),
+        "-map", "[g]", "-loop", "0", "-f", "gif", str(parts[1]),
     ]  # fmt: skip
 
 

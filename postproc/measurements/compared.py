@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -88,28 +87,28 @@ class UpliftAtSupports:
     run: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass
 class Comparison:
     """A measured passage beside a run.
 
     Attributes
     ----------
     measured, run, lead : names of both, and a sentence on the run
+    remarks : sentences on damage, on the noise floor, and on what cannot be told apart
     overlays : of the pantographs that were measured
     uplift : None if it was not measured
     figures : of run and measurement
     findings : errors; empty if there is none
-    remarks : sentences on the noise floor, and on what cannot be told apart
     """
 
     measured: str
     run: str
     lead: str
-    overlays: Sequence[Overlay]
-    uplift: UpliftAtSupports | None
-    figures: Sequence[Compared]
-    findings: Sequence[Finding]
-    remarks: Sequence[str]
+    remarks: list[str]
+    overlays: list[Overlay] = field(default_factory=list)
+    uplift: UpliftAtSupports | None = None
+    figures: list[Compared] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
     @property
     def passed(self) -> bool | None:

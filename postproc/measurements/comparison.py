@@ -78,39 +78,31 @@ def compare_with(results: Results, passage: Passage) -> Comparison:
                 f"{passage.name} has pantograph {one.pantograph + 1} by its description, and the "
                 f"run in {results.path} has {len(names)}"
             )
-    work = _Comparing(results, passage, names)
-    for one in passage.forces:
-        work.pantograph(one)
-    work.unmeasured()
-    if passage.uplift is not None:
-        work.uplifts(passage.uplift)
     about = results.attributes
     lead = (
         f"{passage.name} beside {results.path} ({about['case']}, "
         f"{3.6 * results.fact('speed'):.0f} km/h), {passage.stretch[0]:g} to "
         f"{passage.stretch[1]:g} m, forces below {passage.cut_off:g} Hz"
     )
-    return Comparison(
-        passage.name,
-        str(results.path),
-        lead,
-        work.overlays,
-        work.uplift,
-        work.figures,
-        work.findings,
-        work.remarks,
-    )
+    found = Comparison(passage.name, str(results.path), lead, list(results.damage))
+    work = _Comparing(results, passage, names, found)
+    for one in passage.forces:
+        work.pantograph(one)
+    work.unmeasured()
+    if passage.uplift is not None:
+        work.uplifts(passage.uplift)
+    return found
 
 
 class _Comparing:
-    def __init__(self, results: Results, passage: Passage, names: Sequence[str]) -> None:
+    """Work on a comparison, to which overlays, figures, findings and remarks are added."""
+
+    def __init__(
+        self, results: Results, passage: Passage, names: Sequence[str], found: Comparison
+    ) -> None:
         self._results, self._passage, self._names = results, passage, names
+        self._found = found
         self._runs: dict[int, RunForce] = {}
-        self.overlays: list[Overlay] = []
-        self.uplift: UpliftAtSupports | None = None
-        self.figures: list[Compared] = []
-        self.findings: list[Finding] = []
-        self.remarks: list[str] = []
 
     def _run(self, number: int) -> RunForce:
         if number not in self._runs:
@@ -127,7 +119,7 @@ class _Comparing:
         return max(begin, float(run.position[0])), min(end, float(run.position[-1]))
 
     def _find(self, kind: str, name: str, text: str, value: float = float("nan")) -> None:
-        self.findings.append(Finding(kind, name, text, value))
+        self._found.findings.append(Finding(kind, name, text, value))
 
     # ---- a pantograph ---------------------------------------------------------------------------
 
@@ -146,6 +138,12 @@ class _Comparing:
         valid = slice(passage.margin(dt), own.place.size - passage.margin(dt))
         place, force = own.place[valid], passage.in_band(force, dt)[valid]
         begin, end = self._stretch(run)
+        if begin >= end:
+            raise InputError(
+                f"{self._results.path} has the {name} from {run.position[0]:g} to "
+                f"{run.position[-1]:g} m, and nothing of what is compared, {passage.stretch[0]:g} "
+                f"to {passage.stretch[1]:g} m"
+            )
         length = float(place[-1] - place[0]) if place.size else 0.0
         least = LEAST_PERIODS * run.speed / passage.cut_off
         if min(length, end - begin) < least:
@@ -156,10 +154,10 @@ class _Comparing:
             )
         aligned = self._placed(own, place, force)
         if aligned is not None:
-            self.findings += errors_of(aligned, name, run, passage, own.bias)
+            self._found.findings += errors_of(aligned, name, run, passage, own.bias)
             if aligned.other_shifts:
                 shifts = ", ".join(f"{shift:+.1f}" for shift in aligned.other_shifts[:4])
-                self.remarks.append(f"{name}: shifts of {shifts} m fit as well")
+                self._found.remarks.append(f"{name}: shifts of {shifts} m fit as well")
             self._noise_floor(aligned, name, passage.noise_in_band(own.noise, dt))
         at = place if aligned is None else aligned.placed(place)
         within = (at >= begin) & (at <= end)
@@ -172,14 +170,14 @@ class _Comparing:
         wave = run.speed / passage.cut_off
         if at[0] > begin + wave or at[-1] < end - wave:
             text = f"compared from {at[0]:.0f} to {at[-1]:.0f} m, which is all that was measured"
-            self.remarks.append(f"{name}: {text}")
+            self._found.remarks.append(f"{name}: {text}")
         modelled = run.below(passage.cut_off)(at)
         heights = self._heights(own, valid, within, at, dt)
         self._force_figures(name, at, force, run)
         if heights is not None:
             self._height_figures(name, *heights, own, dt)
         measured_height, run_height = heights or (None, None)
-        self.overlays.append(
+        self._found.overlays.append(
             Overlay(name, at, force, modelled, measured_height, run_height, aligned)
         )
 
@@ -241,7 +239,7 @@ class _Comparing:
         """Add a remark on the residual and on the smallest errors that show beside it;
         ``stated`` is the noise [N]."""
         factor, length = np.sqrt(CERTAIN), found.length
-        self.remarks.append(
+        self._found.remarks.append(
             f"{name}: noise floor {found.residual:.2f} N (correlation {found.correlation:.3f}); "
             f"reported are a shift above {max(SHIFT, factor * found.shift.deviation):.2g} m, a "
             f"drift above {max(DRIFTED, factor * found.drift.deviation * length):.2g} m, a gain "
@@ -253,7 +251,7 @@ class _Comparing:
         """Add a remark on the part of a floor beyond the stated noise, zero if not stated."""
         if stated and floor > _MORE_THAN_NOISE * stated:
             more = np.sqrt(floor**2 - stated**2)
-            self.remarks.append(
+            self._found.remarks.append(
                 f"{name}: of the {what} the stated noise is {stated:.2f} {unit}: {more:.2f} {unit} "
                 "are not of it, and the run differs from the measurement by so much"
             )
@@ -289,7 +287,7 @@ class _Comparing:
             STATISTICS, differences(first, second, paired=True) or (), strict=False
         ):
             chance = "more than chance" if one.is_certain else "within chance"
-            self.remarks.append(
+            self._found.remarks.append(
                 f"{name}: {what}, run - measured, {one.value:+.2f} N with a 95 % interval from "
                 f"{one.low:+.2f} to {one.high:+.2f} N: {chance}"
             )
@@ -324,7 +322,7 @@ class _Comparing:
         if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, BIASES * own.height_bias):
             text = f"{name}: head heights are {1e3 * offset:+.1f} mm off the run's throughout"
             self._find("height", name, text, offset)
-        self.remarks.append(f"{name}: noise floor of heights {1e3 * rest:.2f} mm")
+        self._found.remarks.append(f"{name}: noise floor of heights {1e3 * rest:.2f} mm")
         stated = 1e3 * self._passage.noise_in_band(own.height_noise, dt)
         self._beyond_noise(name, "noise floor of heights", "mm", 1e3 * rest, stated)
         values = 1e3 * float(np.ptp(run)), 1e3 * float(np.ptp(measured))
@@ -358,7 +356,7 @@ class _Comparing:
             because = f"noise alone may add {noise:.3g} {unit} to the measured figure"
         else:
             passed = False
-        self.figures.append(
+        self._found.figures.append(
             Compared(label, name, unit, run, measured, tolerance, passed, because, source)
         )
 
@@ -394,15 +392,18 @@ class _Comparing:
         if abs(off) > 1.0:
             text = f"supports of the uplifts stand {off:+.1f} m off the run's"
             self._find("supports", "", text, off)
-        self.uplift = UpliftAtSupports(
+        self._found.uplift = UpliftAtSupports(
             x[nearest[near]], measured.largest[near], uplift[nearest[near]]
         )
-        difference = self.uplift.measured - self.uplift.run
+        difference = self._found.uplift.measured - self._found.uplift.run
         scatter = float(difference.std()) if difference.size > 2 else measured.noise
-        self.remarks.append(
+        self._found.remarks.append(
             f"uplift at {difference.size} supports: measured {1e3 * difference.mean():+.1f} mm "
             f"beyond the run's on average, scatter {1e3 * scatter:.1f} mm"
         )
-        values = 1e3 * float(self.uplift.run.max()), 1e3 * float(self.uplift.measured.max())
+        values = (
+            1e3 * float(self._found.uplift.run.max()),
+            1e3 * float(self._found.uplift.measured.max()),
+        )
         noise = 3.0 * 1e3 * max(scatter, measured.noise)
         self._figure("largest uplift at supports", "", "mm", "uplift", values, 20.0, noise)

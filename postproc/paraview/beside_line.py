@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from catenary.postproc.files.disk import appears_whole, open_to_write, write_whole
+from catenary.postproc.files.disk import write_whole
 from catenary.postproc.film.scenery import FORCES, Scenery
 from catenary.postproc.film.snapshots import Snapshots
 
@@ -42,7 +42,8 @@ def write(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Pat
         If they cannot be written.
     """
     data, grids = scenery.data, {name: list[str]() for name in scenery.parts}
-    with appears_whole(folder / _NUMBERS) as temporary, open_to_write(temporary, "w") as file:
+    # In memory: HDF5 crashes the interpreter at its end where a disk has refused a write.
+    with h5py.File(_NUMBERS, "w", driver="core", backing_store=False) as file:
         still = {
             name: (
                 _topology(_put(file, f"{name}/cells", part.cells.astype(np.int32))),
@@ -66,6 +67,8 @@ def write(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Pat
                 grids[name].append(
                     _grid(topology, points, fields, of_cells, time if moves else None)
                 )
+        file.flush()
+        write_whole(folder / _NUMBERS, bytes(file.id.get_file_image()))
     files = {name: folder / f"{name}.xdmf" for name in grids}
     for name, path in files.items():
         write_whole(path, _text(name, grids[name]))

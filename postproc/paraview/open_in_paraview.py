@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgb
 
 from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
-from catenary.postproc.files.disk import write_whole
+from catenary.postproc.files.disk import unwritten, write_whole
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.options import View
 from catenary.postproc.film.projection import Picture, room_above
@@ -54,7 +54,9 @@ def write_script(
     Raises
     ------
     InputError
-        If the folder holds no run with snapshots, or cannot be written to.
+        If the folder holds no run with snapshots.
+    RunBroken
+        If it cannot be written to.
     """
     target = folder / FOLDER
     with Results(folder, records) as results:
@@ -72,7 +74,7 @@ def write_script(
                     _script({**settings, **{name: path.name for name, path in files.items()}}),
                 )
             except OSError as error:
-                raise InputError(f"{target} cannot be written: {error}") from error
+                raise unwritten(target, error) from error
     return [target / SCRIPT, *files.values()]
 
 

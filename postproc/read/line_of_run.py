@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.line_record import LineRecord
-from catenary.postproc.read.records import Records
+from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.registration import Registration
+from catenary.postproc.read.validated_file import ValidatedFile
 
 # Places along the line come from sums of span lengths, which round by far less [m].
 _ROUNDING = 1e-6
@@ -35,39 +36,28 @@ class ContactProfile(NamedTuple):
     height: np.ndarray
     y: np.ndarray | None = None
 
+    def pieces(self) -> list[slice]:
+        """Its nodes, piece by piece."""
+        ends = [0, *self.breaks.tolist(), self.x.size]
+        return [slice(*pair) for pair in itertools.pairwise(ends) if pair[0] < pair[1]]
+
+    def height_at(self, x: np.ndarray) -> np.ndarray:
+        """Height of its lowest piece at places ``x`` along the track [m], infinite where it has
+        none."""
+        height = np.full(np.shape(x), np.inf)
+        for own in self.pieces():
+            piece = np.interp(x, self.x[own], self.height[own], np.inf, np.inf)
+            height = np.minimum(height, piece)
+        return height
+
     def drawn(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places along the track and values at the nodes, with a gap between pieces."""
         x = np.insert(self.x, self.breaks, self.x[self.breaks])
         return x, np.insert(values, self.breaks, np.nan)
 
 
-class ResultTables(Protocol):
-    """The tables of a result file, which is open and valid, or of a march that wrote none; see
-    `ValidatedFile`."""
-
-    attrs: dict[str, Any]
-    facts: dict[str, np.ndarray]
-    sizes: dict[str, int]
-    record: LineRecord
-
-    @property
-    def records(self) -> Records: ...
-
-    @property
-    def damage(self) -> list[str]: ...
-
-    @property
-    def has_energies(self) -> bool: ...
-
-    def __contains__(self, path: str) -> bool: ...
-
-    def __getitem__(self, path: str) -> Any: ...
-
-    def extremes(self, n_steps: int) -> dict[str, np.ndarray] | None: ...
-
-    def state(self) -> Any: ...
-
-    def close(self) -> None: ...
+# The tables of a result file, which is open and valid, or of a march that wrote none.
+ResultTables = ValidatedFile | MarchedFile
 
 
 class LineOfRun:
@@ -164,12 +154,13 @@ class LineOfRun:
         masts = self.line("support_x")
         middle = 0.5 * sum(self.evaluation)
         span = int(np.clip(np.searchsorted(masts, middle, side="right") - 1, 0, masts.size - 2))
-        wires = self._contact_wires_in(masts)
+        middles = 0.5 * (masts[:-1] + masts[1:])
+        heights = [wire.height_at(middles) for wire in self.contact_profiles().values()]
+        wires = np.isfinite(heights).sum(axis=0)
         usual = np.flatnonzero(wires == np.median(wires))
         if wires[span] <= np.median(wires) or not usual.size:
             return span
-        away = np.abs(0.5 * (masts[usual] + masts[usual + 1]) - middle)
-        return int(usual[np.argmin(away)])
+        return int(usual[np.argmin(np.abs(middles[usual] - middle))])
 
     @cached_property
     def span_at_rest(self) -> int:
@@ -179,14 +170,3 @@ class LineOfRun:
         if not at.size:
             return self.reference_span
         return int(np.searchsorted(masts, 0.5 * (at[0] + at[-1]), side="right")) - 1
-
-    def _contact_wires_in(self, masts: np.ndarray) -> np.ndarray:
-        """Number of contact wires in each span, (n_spans,)."""
-        x, elements = self.line("node_points")[:, 0], self.elements()
-        middles = 0.5 * (masts[:-1] + masts[1:])
-        count = np.zeros(middles.size)
-        for name in self.wires_of(Role.CONTACT):
-            low, high = x[elements[name]].T
-            at = np.clip(np.searchsorted(high, middles), None, high.size - 1)
-            count += (low[at] <= middles) & (middles <= high[at])
-        return count

@@ -85,9 +85,5 @@ class MarchedFile:
         """Extremes of the line's channels."""
         return self._extremes
 
-    def state(self) -> tuple[None, list[str]]:
-        """Return no state to continue from."""
-        return None, []
-
     def close(self) -> None:
         """Do nothing: no file is open."""

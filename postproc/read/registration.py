@@ -10,13 +10,8 @@ import numpy as np
 from catenary.postproc.files.csv_text import csv_text
 
 _HEADS = (
-    "position [m]",
-    "stagger [m]",
-    "radial force [N]",
-    "lift [N]",
-    "slope [deg]",
-    "force along the track [N]",
-    "slew [deg]",
+    *("position [m]", "stagger [m]", "radial force [N]", "lift [N]"),
+    *("slope [deg]", "force along the track [N]", "slew [deg]"),
 )
 
 
@@ -89,6 +84,11 @@ class Registration(NamedTuple):
         sideways, _, along = self._towards_hinge.T
         return np.arctan2(along, np.abs(sideways))
 
+    @property
+    def heads(self) -> list[str]:
+        """The heads of the table."""
+        return [*_HEADS, *(["wire"] if self.wires else [])]
+
     def rows(self) -> list[tuple[str, ...]]:
         """The columns of the table as text: place, stagger, radial force, lift, slope, what the arm
         pulls along the track by how much it is slewed, and its wire where there are several."""
@@ -106,7 +106,7 @@ class Registration(NamedTuple):
 
     def csv(self) -> str:
         """The table as CSV text."""
-        return csv_text([*_HEADS, *(["wire"] if self.wires else [])], self.rows())
+        return csv_text(self.heads, self.rows())
 
 
 def _fixed(value: float, digits: int) -> str:

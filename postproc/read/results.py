@@ -327,6 +327,7 @@ class Results(TrainOfRun):
         InputError
             If the file holds none.
         """
+        assert isinstance(self._file, ValidatedFile)
         state, sentences = self._file.state()
         for sentence in sentences:
             logger.warning("%s", sentence)

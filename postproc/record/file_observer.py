@@ -55,6 +55,5 @@ class FileObserver(Observer, Generic[File]):
 
     @property
     def _open_file(self) -> File:
-        if self._file is None:
-            raise RuntimeError("the recorder was not started")
+        assert self._file is not None  # since the start
         return self._file

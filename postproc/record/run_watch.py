@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -46,61 +45,6 @@ _ROTATIONS = ("theta_y", "theta_z")
 _LOOKS = 1.0
 
 
-def watch_cadence(dt: float) -> int:
-    """Steps of ``dt`` [s] between two looks at energy and motion."""
-    return max(1, round(_LOOKS / dt))
-
-
-@dataclass(frozen=True)
-class WatchInputs:
-    """The data of a run that its watch needs.
-
-    Attributes
-    ----------
-    static_energy : energy of the line at rest under the pantographs' static forces [J]; energies
-        below a share of it are not judged
-    counts_energy : whether the line's energy can grow by the work of contacts alone, and that work
-        is summed
-    arm_length : (n_arms,) lengths of steady arms [m], infinite where arms have none
-    raised : (n_pantographs,) time from which on each is raised [s], infinite if it is lowered
-    span : distance without contact above which a loss is reported [m]
-    coupling : of line and pantographs, which is not stable at any step unless it is ``implicit``
-    """
-
-    static_energy: float
-    counts_energy: bool
-    arm_length: np.ndarray
-    raised: np.ndarray
-    span: float
-    coupling: str
-
-
-def watch_inputs(at_rest: LineAtRest, has_train: bool = True) -> WatchInputs:
-    """Inputs of the watch of a run on a line ``at_rest``; ``has_train`` is whether there is a
-    train, without which there are no contacts. Not collective."""
-    problem, model = at_rest.problem, at_rest.model
-    numerics, train = problem.numerics, problem.train
-    lengths = np.array([*(arms.kind.length for arms in problem.line.steady_arms), 0.0])
-    lengths[lengths == 0.0] = np.inf
-    static = sum(place.static_force**2 for place in train.placements)
-    outer = any(not isinstance(load, MemoryLoad) for load in model.loads)
-    steady = not outer and not model.simulated.incidents
-    summed = numerics.adaptive_tolerance is None
-    return WatchInputs(
-        static_energy=0.5 * static * float(np.max(at_rest.lift.lift, initial=0.0)),
-        counts_energy=steady and summed,
-        arm_length=lengths[model.mesh.arm_group],
-        raised=np.array(
-            [
-                train.raise_time if has_train and place.lowering is None else np.inf
-                for place in train.placements
-            ]
-        ),
-        span=float(np.diff(problem.line.support_positions).max()),
-        coupling=numerics.coupling if has_train else "implicit",
-    )
-
-
 class RunWatch(Observer):
     """Observer that judges a march while it goes on. Collective.
 
@@ -109,16 +53,40 @@ class RunWatch(Observer):
     Parameters
     ----------
     comm : mpi4py communicator
-    run : data of the run
-    every : steps between two looks at energy and motion
+    at_rest : line of the run
+    has_train : whether there is one, without which there are no contacts
+    every : steps between two looks at energy and motion, those of ``_LOOKS`` if None
 
     Attributes
     ----------
     remarks : sentences on what was wrong, on rank 0
     """
 
-    def __init__(self, comm: Any, run: WatchInputs, every: int) -> None:
-        self._comm, self._run, self._every = comm, run, every
+    def __init__(
+        self, comm: Any, at_rest: LineAtRest, has_train: bool = True, every: int | None = None
+    ) -> None:
+        problem, model = at_rest.problem, at_rest.model
+        numerics, train = problem.numerics, problem.train
+        self._comm, self._every = comm, every or max(1, round(_LOOKS / numerics.dt))
+        # Energy of the line under the static forces, beside which energies are judged [J].
+        static = sum(place.static_force**2 for place in train.placements)
+        self._static_energy = 0.5 * static * float(np.max(at_rest.lift.lift, initial=0.0))
+        # Whether it can grow by the work of contacts alone, and that work is summed.
+        outer = any(not isinstance(load, MemoryLoad) for load in model.loads)
+        steady = not outer and not model.simulated.incidents
+        self._counts_energy = steady and numerics.adaptive_tolerance is None
+        # Lengths of steady arms, infinite where they have none [m].
+        lengths = np.array([*(arms.kind.length for arms in problem.line.steady_arms), 0.0])
+        lengths[lengths == 0.0] = np.inf
+        self._arm_lengths = lengths[model.mesh.arm_group]
+        # Time from which on each pantograph is raised [s].
+        self._raised = [
+            train.raise_time if has_train and place.lowering is None else np.inf
+            for place in train.placements
+        ]
+        self._span = float(np.diff(problem.line.support_positions).max())
+        # Of line and pantographs, which is not stable at any step unless it is implicit.
+        self._coupling = numerics.coupling if has_train else "implicit"
         self.remarks: list[str] = []
         self._reported: set[str] = set()
         self._start: tuple[float, float] | None = None
@@ -130,7 +98,7 @@ class RunWatch(Observer):
         self._dt, self._n_steps = stage.dt, stage.n_steps
         self._x = stage.node_points[stage.owned_nodes, 0]
         self._rotations = [name for name in _ROTATIONS if name in stage.unknowns]
-        self._arm_length = self._run.arm_length[stage.owned_arms]
+        self._arm_length = self._arm_lengths[stage.owned_arms]
         self._arm_x = stage.arm_x[stage.owned_arms]
         self._lost_since = np.full(stage.n_pantographs, np.nan)
         self._lost_at = np.zeros(stage.n_pantographs)
@@ -172,7 +140,7 @@ class RunWatch(Observer):
             "line_energy_J": self._energy,
             "most_line_energy_J": self._most_energy,
         }
-        if self._run.counts_energy:
+        if self._counts_energy:
             facts |= {"contact_work_J": self._work, "energy_made_J": self._made}
         return facts
 
@@ -184,12 +152,12 @@ class RunWatch(Observer):
         self._energy, self._work = energy - self._start[0], work - self._start[1]
         self._most_energy = max(self._most_energy, self._energy)
         self._check_motion(view)
-        if self._run.counts_energy:
+        if self._counts_energy:
             self._check_energy(view)
 
     def _check_energy(self, view: StepView) -> None:
         self._most_work = max(self._most_work, abs(self._work))
-        given = self._most_work + self._run.static_energy
+        given = self._most_work + self._static_energy
         made = self._energy - self._work
         self._made = max(self._made, made)
         if not made <= REPORTED_SHARE * given:
@@ -243,8 +211,8 @@ class RunWatch(Observer):
             self._say(key, f"At {self._where(view)} {what}; {model} holds up to {limit:g}.")
         if not found <= most:
             suspects = "arms that are pushed at rest, too long a numerics.dt_s, "
-            if self._run.coupling != "implicit":
-                suspects += f'the {self._run.coupling} coupling (numerics.coupling = "implicit"), '
+            if self._coupling != "implicit":
+                suspects += f'the {self._coupling} coupling (numerics.coupling = "implicit"), '
             raise RunBroken(
                 f"at {self._where(view)} {what}, and {model} ends at {most:g}: look for steady "
                 f"{suspects}or loads beyond any line's"
@@ -265,7 +233,7 @@ class RunWatch(Observer):
         if not forces.shape[1]:
             return  # on another rank
         places = view.each("contact_position")
-        for p, raised in enumerate(self._run.raised):
+        for p, raised in enumerate(self._raised):
             touching = np.flatnonzero((forces[:, p] != 0.0) | (times < raised))
             first = 0
             if touching.size:
@@ -275,7 +243,7 @@ class RunWatch(Observer):
                     continue
             if np.isnan(self._lost_since[p]):
                 self._lost_since[p], self._lost_at[p] = times[first], places[first, p]
-            if places[-1, p] - self._lost_at[p] > self._run.span:
+            if places[-1, p] - self._lost_at[p] > self._span:
                 self._say(
                     f"lost {p}",
                     f"Pantograph {p + 1} has not touched a wire for more than a span, from "

@@ -79,6 +79,7 @@ def _template() -> Template:
     )
     environment.filters["minus"] = lambda value: with_minus(str(value))
     environment.filters["commands"] = _with_commands
+    environment.filters["unit_whole"] = _with_whole_unit
     return environment.get_template("page.html.j2")
 
 
@@ -89,6 +90,13 @@ def _with_commands(text: str) -> Any:
     # A figure stays on the line of its unit.
     words = _BEFORE_UNIT.sub("\u00a0", str(escape(with_minus(text)))).split("`")
     return Markup("".join(f"<code>{w}</code>" if n % 2 else w for n, w in enumerate(words)))
+
+
+def _with_whole_unit(head: str) -> Any:
+    """The head of a column as HTML, in which no line ends within the unit."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"\[.*\]", r"<span>\g<0></span>", str(escape(head))))
 
 
 def _data_uri(data: bytes) -> str:

@@ -6,7 +6,7 @@ Keys end in the unit that a reader expects (mm, km/h); what a run does not give 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -124,8 +124,8 @@ def _short(
             "max_force_N": statistics.droppers.maximum,
             "min_force_N": statistics.droppers.minimum,
         },
-        "acceptance": [_criterion(c) for c in criteria if not c.absent],
-        "not_judged": [_unjudged(c) for c in criteria if c.absent],
+        "acceptance": [_chosen(c, _JUDGED) for c in criteria if not c.absent],
+        "not_judged": [_chosen(c, _UNJUDGED) for c in criteria if c.absent],
         "passed": verdict(criteria) if results.complete else None,
         "remarks": all_remarks(results, indicators),
         "supports": {"max_uplift_mm": 1e3 * statistics.supports.maximum},
@@ -236,27 +236,15 @@ def _effects(attributes: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _criterion(c: Criterion) -> dict[str, Any]:
-    return {
-        "criterion": c.criterion,
-        "value": c.value,
-        "limit": c.limit,
-        "unit": c.unit,
-        "relation": c.relation,
-        "passed": c.passed,
-        "clause": c.clause,
-        "book": c.book,
-        "rule": c.rule,
-        "compared": c.compared,
-        "because": c.because or None,
-    }
+# What is told of criteria that are judged, and of those that a run has no data for.
+_JUDGED = (
+    *("criterion", "value", "limit", "unit", "relation", "passed"),
+    *("clause", "book", "rule", "compared", "because"),
+)
+_UNJUDGED = ("criterion", "clause", "book", "rule", "because")
 
 
-def _unjudged(c: Criterion) -> dict[str, Any]:
+def _chosen(one: Criterion, names: Sequence[str]) -> dict[str, Any]:
     return {
-        "criterion": c.criterion,
-        "clause": c.clause,
-        "book": c.book,
-        "rule": c.rule,
-        "because": c.because,
+        name: getattr(one, name) if name != "because" else one.because or None for name in names
     }

@@ -24,7 +24,6 @@ from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.record.snapshots.blocks import RecordedLine
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.time_loop.views.channels import TrainLayout
@@ -196,7 +195,7 @@ def test_fields_reach_the_file(folder: Path, share: Share) -> None:
     recorder = FieldRecorder(
         COMM,
         folder / "fields.xdmf",
-        RecordedLine(wires, np.array([[35, 5], [45, 15]])),
+        MARCH.recorded._replace(mesh=replace(MARCH.mesh, wires=wires)),
         every=20,
         record=FieldRecord(("uplift", "velocity", "tension")),
     )
@@ -228,9 +227,11 @@ def test_a_window_gathers_what_it_shows(folder: Path, share: Share) -> None:
     recorder = FieldRecorder(
         COMM,
         folder / "fields.xdmf",
-        RecordedLine({"contact_wire": nodes}),
+        MARCH.recorded._replace(mesh=replace(MARCH.mesh, wires={"contact_wire": nodes})),
         every=20,
-        record=FieldRecord(("uplift", "velocity"), window=(4.0, 6.0), course=course),
+        record=FieldRecord(
+            ("uplift", "velocity"), ("contact_wire",), window=(4.0, 6.0), course=course
+        ),
     )
     recorder.most_kept = 3
     recorder.start(make_stage(share))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -85,6 +87,28 @@ def test_a_program_in_python_prolongs_a_run(whole: Path, begun: Path, tmp_path: 
 
 
 @pytest.mark.study
+@pytest.mark.process
+def test_a_full_disk_leaves_the_run_as_it_is(begun: Path, tmp_path: Path) -> None:
+    """The copy fits, its changes do not; HDF5 would crash the program at its end."""
+    out = tmp_path / "run"
+    shutil.copytree(begun, out)
+    before = (out / "run.h5").read_bytes()
+    script = (
+        "import resource, sys\n"
+        "from mpi4py import MPI  # which is not to meet the limit\n"
+        "most = int(sys.argv.pop(1)), resource.RLIM_INFINITY\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, most)\n"
+        "from catenary.cases.cli.main import main\n"
+        "main()\n"
+    )
+    words = [str(len(before)), "restart", str(out), *LATER]
+    done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True)
+    last = done.stderr.strip().splitlines()[-1]
+    assert done.returncode == 1, done
+    assert last.endswith("cannot be given a later end (File too large); it is as it was")
+    assert (out / "run.h5").read_bytes() == before and not list(out.glob(".run*"))
+
+
 def test_a_file_without_checksums_goes_on_as_well(begun: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     shutil.copytree(begun, out)

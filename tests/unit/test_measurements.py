@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -120,6 +122,20 @@ def test_noise_that_was_stated_is_beside_what_remains(run: Path, table: pd.DataF
     # The root of 2^2 - 0.5^2, of noise with 3 % of its own.
     assert "the stated noise is 0.50 N" in text
     assert float(text.split(": ")[2].split(" N")[0]) == pytest.approx(1.94, rel=0.1)
+
+
+def test_a_damaged_run_is_told_and_one_that_ends_before_the_stretch_refused(
+    run: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    shutil.copy(run / "run.h5", tmp_path)
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        file["time"][2800:] = np.nan
+    assert any("time is damaged from record" in one for one in found_in(tmp_path, table).remarks)
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        file["time"][300:] = np.nan
+    words = r"from 65 to 106\.\d+ m, and nothing of what is compared, 120 to 420 m"
+    with pytest.raises(InputError, match=words):
+        found_in(tmp_path, table)
 
 
 def test_noise_of_heights_is_beside_what_remains(run: Path, table: pd.DataFrame) -> None:
@@ -261,6 +277,15 @@ def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
     check("mean", found[0].value, per_span.mean(), within=1e-10)
     check("interval", np.array(found[0][1:]), np.array(expected), within=1e-9)
     assert differences(*(SpanSums(*(one[:3] for one in own)) for own in sums), True) is None
+
+
+def test_a_stretch_without_masts_has_no_spans() -> None:
+    """Nothing is said of differences there, whatever the records hold."""
+    place, force = np.linspace(10.0, 20.0, 9), np.full(9, 120.0)
+    for edges in (np.zeros(0), np.array([15.0])):
+        sums = span_sums(place, force, edges)
+        assert sums.samples.size == 0
+        assert differences(sums, sums, paired=True) is None
 
 
 @pytest.mark.parametrize("paired", [True, False])
@@ -422,7 +447,7 @@ def test_a_file_with_the_usual_names_needs_no_description(
         (
             "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
             "from_m = 1000.0\nto_m = 2000.0",
-            "both must have at least 69 m, 20 periods of 20 Hz",
+            "and nothing of what is compared, 1000 to 2000 m",
         ),
     ],
 )

@@ -268,7 +268,7 @@ def test_components_of_pieces_are_told_apart() -> None:
     """Elements of a wire of several pieces, as fields and result files have them."""
     line = make_line(data_of("stitched"))
     mesh = mesh_of(line, 1)
-    blocks = blocks_of(RecordedLine.of(line, mesh, np.zeros(mesh.n_nodes)), mesh.points)
+    blocks = blocks_of(RecordedLine(line, mesh, np.zeros(mesh.n_nodes)), mesh.points)
     assert [block.name for block in blocks][:3] == list(mesh.wires)
     (block,) = (block for block in blocks if block.name == STITCH)
     cells = block.cells(0, len(block.nodes))

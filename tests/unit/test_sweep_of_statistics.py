@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -250,6 +252,26 @@ def _tables_of(
 
 def test_histories_of_a_lost_process_are_waited_for(tmp_path: Path) -> None:
     KeptHistories(tmp_path, ["contact_force"], "sweep").join([], {tmp_path / "lost.h5": []})
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.process
+def test_histories_on_a_full_disk_end_with_a_sentence(tmp_path: Path) -> None:
+    """And not with a crash: HDF5 would write again at the end of the program."""
+    script = (
+        "import resource, sys\nimport numpy as np\nfrom pathlib import Path\n"
+        "from catenary.cases.studies.sweep.histories import piece_file\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))\n"
+        "names = 'time', 'channels/contact_position', 'channels/contact_force'\n"
+        "with piece_file(Path(sys.argv[1]), ['contact_force']) as put:\n"
+        "    for number in range(9):\n"
+        "        put(number, {name: np.zeros(200) for name in names})\n"
+    )
+    words = [sys.executable, "-c", script, str(tmp_path / "piece.h5")]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert done.returncode == 1, done
+    last = done.stderr.strip().splitlines()[-1]
+    assert "RunBroken: writing" in last and "piece.h5 failed (File too large)" in last
     assert not list(tmp_path.iterdir())
 
 

@@ -16,7 +16,7 @@ from measuring import COMM, History, check, march
 from small_lines import HANGING, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.hardware import DropperKind
-from catenary.postproc.record.run_watch import RunWatch, watch_inputs
+from catenary.postproc.record.run_watch import RunWatch
 from catenary.solver.effects.shipped.stiff_link_effects import NAME
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.line_at_rest import line_at_rest
@@ -89,7 +89,7 @@ def test_stiff_droppers_make_energy_without_it() -> None:
 
 def watch_of(problem: Problem) -> tuple[RunWatch, str]:
     rest = line_at_rest(problem, mesh_of(problem.line, 5))
-    watch = RunWatch(COMM, watch_inputs(rest), 20)
+    watch = RunWatch(COMM, rest, every=20)
     with March(COMM, *rest) as run:
         outcome = run.run([watch, History()]).outcome
     return watch, outcome

@@ -51,7 +51,7 @@ def test_a_snapshot_shows_what_the_stretch_adds(
     state = np.zeros(model.n_dofs)
     for (name, _), values in motion.items():
         state[model.dofs(np.arange(mesh.n_nodes), name)] = values[0]
-    recorded = RecordedLine.of(problem.line, mesh, form.slope, form.lateral)
+    recorded = RecordedLine(problem.line, mesh, form.slope, form.lateral)
     points = mesh.points.copy()
     points[:, 2] = form.height
     values = FieldValues(recorded, points)

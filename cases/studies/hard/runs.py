@@ -21,7 +21,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.hard.balance import LineBalance
-from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
+from catenary.postproc.record.run_watch import RunWatch
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
@@ -278,7 +278,7 @@ def run(
     balance = LineBalance(rest.model, rest.problem, rest.form.dropper_force) if with_work else None
     keep = [happened.step for happened in in_steps(simulated.incidents, rest.problem.numerics.dt)]
     watcher = Watcher(wire, keep, balance)
-    watch = _EndlessWatch(comm, watch_inputs(rest), watch_cadence(rest.problem.numerics.dt))
+    watch = _EndlessWatch(comm, rest)
     with March(comm, *rest) as march:
         ended = march.run([watcher, watch] if self_watched else [watcher])
     found = watcher.histories(ended.outcome, ended.counters)

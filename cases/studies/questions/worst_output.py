@@ -40,7 +40,8 @@ def answer_of(results: Results, count: int) -> Answer:
     start, end = results.evaluation
     lines = [
         f"{results.attributes['case']} at {3.6 * results.fact('speed'):.0f} km/h, evaluated from "
-        f"{start:.0f} to {end:.0f} m"
+        f"{start:.0f} to {end:.0f} m",
+        *results.damage,
     ]
     if not places.passages:
         lines.append("No span lies whole within the evaluated stretch and the record.")

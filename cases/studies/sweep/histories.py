@@ -8,7 +8,7 @@ xarray opens the file by names.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import HISTORIES
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.files.dimensions import CONVENTIONS
-from catenary.postproc.files.disk import appears_whole, opened, unwritten
+from catenary.postproc.files.disk import MARGIN, appears_whole, opened, reserve, unwritten
 from catenary.postproc.files.filtered_force import PATH as FILTERED
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
 from catenary.postproc.files.hdf5.self_contained import open_own
@@ -61,8 +61,9 @@ def piece_file(path: Path | None, names: Sequence[str]) -> Iterator[Put]:
     with _written(path) as file:
 
         def put(number: int, tables: Mapping[str, np.ndarray]) -> None:
-            group = file.create_group(str(number))
-            for name, values in _chosen(tables, names).items():
+            group, chosen = file.create_group(str(number)), _chosen(tables, names)
+            _reserve(file, chosen.values())
+            for name, values in chosen.items():
                 group.create_dataset(name, data=values)
 
         yield put
@@ -166,9 +167,21 @@ def _copy(piece: Path, rows: Sequence[int], file: h5py.File) -> None:
         for number, row in enumerate(rows):
             if str(number) not in source:
                 continue  # a variant that broke
-            for name, table in source[str(number)].items():
-                place = (row, *(slice(0, size) for size in table.shape))
-                file[name][place] = table[...]
+            tables = {name: table[...] for name, table in source[str(number)].items()}
+            _put(file, row, tables)
+
+
+def _put(file: h5py.File, row: int, tables: Mapping[str, np.ndarray]) -> None:
+    """Write the histories of a variant to its row."""
+    _reserve(file, tables.values())
+    for name, table in tables.items():
+        file[name][(row, *(slice(0, size) for size in table.shape))] = table
+
+
+def _reserve(file: h5py.File, tables: Iterable[np.ndarray]) -> None:
+    """Claim room for tables on the disk, behind what was written before."""
+    file.flush()
+    reserve(file, MARGIN + sum(table.nbytes for table in tables))
 
 
 @contextmanager
@@ -179,7 +192,7 @@ def _written(path: Path) -> Iterator[h5py.File]:
         path.parent.mkdir(parents=True, exist_ok=True)
         with appears_whole(path) as partial, opened(partial, "w") as file:
             yield file
-    except OSError as error:
+    except (OSError, RuntimeError) as error:  # h5py raises both
         raise unwritten(path, error) from error
 
 
@@ -228,9 +241,8 @@ def merge_histories(path: Path, folders: Mapping[str, Path]) -> tuple[list[Path]
         with _written(path) as file:
             _describe(file, list(folders), varied, names, tuple(np.max(sizes, axis=0).tolist()))
             for row, (source, own) in enumerate(at):
-                for name in (_TIME, _POSITION, *names):
-                    table = source[name][own]
-                    file[name][(row, *(slice(0, size) for size in table.shape))] = table
+                kept = {name: source[name][own] for name in (_TIME, _POSITION, *names)}
+                _put(file, row, kept)
     return [path], ""
 
 

@@ -22,7 +22,7 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.ensemble import Keeper
 from catenary.postproc.evaluate.filters import low_pass
-from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_inputs
+from catenary.postproc.record.run_watch import RunWatch
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
 from catenary.solver.problem.problem import WindowChoice
@@ -183,7 +183,7 @@ def _forces(rest: LineAtRest, window: WindowChoice) -> tuple[list[np.ndarray], l
     """Filtered force (n,) of each pantograph in the stretch [N], and remarks of the march."""
     problem, seen = replace(rest.problem, window=window), Keeper()
     at_rest = rest._replace(problem=problem)
-    watch = RunWatch(MPI.COMM_SELF, watch_inputs(at_rest), watch_cadence(problem.numerics.dt))
+    watch = RunWatch(MPI.COMM_SELF, at_rest)
     with March(MPI.COMM_SELF, *at_rest) as run:
         outcome = run.run([seen, watch])
     if outcome.outcome != "done":

@@ -29,28 +29,6 @@ class Chunk(NamedTuple):
     columns: int
 
 
-def step_chunk(rows_per_flush: int, n_rows: int, n_columns: int) -> Chunk:
-    """Chunk of a table with a row for each step.
-
-    Parameters
-    ----------
-    rows_per_flush : int
-        Rows that are appended at once.
-    n_rows, n_columns : int
-        Rows that the table is planned to have, and its columns.
-    """
-    rows = _rows(rows_per_flush, n_rows, _ROWS_OF_ONE)
-    return Chunk(rows, 1 if rows >= _LEAST_OF_ONE else max(1, n_columns))
-
-
-def line_chunk(rows_per_flush: int, n_rows: int, n_columns: int) -> Chunk:
-    """Chunk of a table of ``n_rows`` rows, written ``rows_per_flush`` at a time, with a column for
-    each of ``n_columns`` places on the line."""
-    n_blocks = max(1, math.ceil(n_columns / BLOCK))
-    rows = _rows(rows_per_flush, n_rows, _ROWS_OF_MANY)
-    return Chunk(rows, max(1, math.ceil(n_columns / n_blocks)))
-
-
 def chunks_of(
     table: Mapping[str, tuple[Channel, int]], n_steps: int, rows_per_flush: int, every: int
 ) -> dict[str, Chunk]:
@@ -67,6 +45,7 @@ def chunks_of(
     every : int
         Steps between two rows of the line's channels.
     """
+    # Rows that are appended at once, and that are planned.
     line = max(1, rows_per_flush // every), n_steps // every + 1
     step = rows_per_flush, n_steps + 1
     shapes = {}
@@ -75,10 +54,12 @@ def chunks_of(
             # Its rows are few, and not so many a flush.
             shapes[path] = Chunk(min(_ROWS_OF_MANY, n_steps + 1), 1)
         elif channel.of_line:
-            shapes[path] = line_chunk(*line, columns)
+            n_blocks = max(1, math.ceil(columns / BLOCK))
+            rows = _rows(*line, _ROWS_OF_MANY)
+            shapes[path] = Chunk(rows, max(1, math.ceil(columns / n_blocks)))
         else:
-            own = line if path.startswith("line_channels/") else step
-            shapes[path] = step_chunk(*own, columns)
+            rows = _rows(*(line if path.startswith("line_channels/") else step), _ROWS_OF_ONE)
+            shapes[path] = Chunk(rows, 1 if rows >= _LEAST_OF_ONE else max(1, columns))
     return shapes
 
 

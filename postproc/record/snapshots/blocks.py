@@ -6,14 +6,13 @@ neighbours. Of everything else two points make a cell: the upper and the lower e
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import DROPPERS, LineMesh
-from catenary.meshgen.track import Curve
 from catenary.solver.model.rest_shape import LateralShape
 
 CLAMPS, ARMS, MASTS = "clamps", "steady_arms", "masts"
@@ -25,55 +24,22 @@ FIXED = -1
 # from there [m].
 BESIDE, _ABOVE, _ARM_RISE = 3.0, 0.4, 0.3
 _NONE = np.zeros(0, dtype=np.int64)
-_NO_PAIRS = np.zeros((0, 2), dtype=np.int64)
 
 
-@dataclass(frozen=True)
-class RecordedLine:
-    """The parts of a line that snapshots show.
+class RecordedLine(NamedTuple):
+    """The line that snapshots show.
 
     Attributes
     ----------
-    wires, breaks, droppers, clamps, steady_arms : as of a `LineMesh`
-    masts : (n,) places along the track [m]
-    slope : (n_nodes,) dw/dx of the wires at rest, empty if not known
-    bending_stiffness : of the wires by name [N m2]
-    axial_stiffness : EA of the wires whose stretch is known [N]
+    line, mesh : as an engineer describes it, and its mesh
+    slope : (n_nodes,) dw/dx of the wires at rest
     lateral : of the wires at rest sideways, None without lateral motion
-    curve : of the track, None if it is straight
     """
 
-    wires: Mapping[str, np.ndarray]
-    droppers: np.ndarray = field(default_factory=lambda: _NO_PAIRS)
-    breaks: Mapping[str, np.ndarray] = field(default_factory=dict)
-    clamps: np.ndarray = field(default_factory=lambda: _NO_PAIRS)
-    steady_arms: np.ndarray = field(default_factory=lambda: _NONE)
-    masts: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    slope: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    bending_stiffness: Mapping[str, float] = field(default_factory=dict)
-    axial_stiffness: Mapping[str, float] = field(default_factory=dict)
+    line: Line
+    mesh: LineMesh
+    slope: np.ndarray
     lateral: LateralShape | None = None
-    curve: Curve | None = None
-
-    @classmethod
-    def of(
-        cls, line: Line, mesh: LineMesh, slope: np.ndarray, lateral: LateralShape | None = None
-    ) -> RecordedLine:
-        """The parts of a line with its mesh, the ``slope`` of its nodes at rest, and its shape
-        across the track, ``lateral``, if it has one."""
-        return cls(
-            mesh.wires,
-            mesh.droppers,
-            mesh.breaks,
-            mesh.clamps,
-            mesh.steady_arms,
-            line.support_positions,
-            slope,
-            {wire.name: wire.bending_stiffness for wire in line.wires},
-            {own.name: own.axial_stiffness for own in line.wires if own.axial_stiffness},
-            lateral,
-            line.curve,
-        )
 
 
 @dataclass(frozen=True)
@@ -143,34 +109,34 @@ class Block:
 
 def blocks_of(line: RecordedLine, points: np.ndarray) -> list[Block]:
     """All blocks of a line whose nodes rest at ``points`` (n_nodes, 3) [m]. Not collective."""
+    mesh, masts = line.mesh, line.line.support_positions
     blocks = [
-        Block(name, np.asarray(nodes), points[nodes], False, line.breaks.get(name, _NONE))
-        for name, nodes in line.wires.items()
+        Block(name, np.asarray(nodes), points[nodes], False, mesh.breaks.get(name, _NONE))
+        for name, nodes in mesh.wires.items()
     ]
-    for name, pairs in ((DROPPERS, line.droppers), (CLAMPS, line.clamps)):
+    for name, pairs in ((DROPPERS, mesh.droppers), (CLAMPS, mesh.clamps)):
         nodes = np.asarray(pairs, dtype=np.int64).ravel()
         if nodes.size:
             blocks.append(Block(name, nodes, points[nodes], True))
-    if line.steady_arms.size:
-        blocks.append(_arms(line, points))
-    if line.masts.size:
-        blocks.append(_masts(line, points))
+    if mesh.steady_arms.size:
+        blocks.append(_arms(mesh.steady_arms, points))
+    if masts.size:
+        blocks.append(_masts(masts, float(points[:, 2].max()) + _ABOVE))
     return blocks
 
 
-def _arms(line: RecordedLine, points: np.ndarray) -> Block:
-    """Steady arms, from their masts down to the wire."""
-    wire = points[line.steady_arms]
+def _arms(held: np.ndarray, points: np.ndarray) -> Block:
+    """Steady arms, from their masts down to the nodes that are ``held``."""
+    wire = points[held]
     hinge = np.column_stack([wire[:, 0], np.full(len(wire), BESIDE), wire[:, 2] + _ARM_RISE])
-    nodes = np.column_stack([np.full(len(wire), FIXED), line.steady_arms]).ravel()
+    nodes = np.column_stack([np.full(len(wire), FIXED), held]).ravel()
     return Block(ARMS, nodes, np.stack([hinge, wire], axis=1).reshape(-1, 3), True)
 
 
-def _masts(line: RecordedLine, points: np.ndarray) -> Block:
-    """Masts beside the track, from the ground up."""
-    n = line.masts.size
-    top = float(points[:, 2].max()) + _ABOVE
+def _masts(x: np.ndarray, top: float) -> Block:
+    """Masts at ``x`` (n,) beside the track, from the ground up to a height [m]."""
+    n = x.size
     ends = np.zeros((n, 2, 3))
-    ends[:, :, 0], ends[:, :, 1] = line.masts[:, None], BESIDE
+    ends[:, :, 0], ends[:, :, 1] = x[:, None], BESIDE
     ends[:, 0, 2] = top
     return Block(MASTS, np.full(2 * n, FIXED), ends.reshape(-1, 3), True)

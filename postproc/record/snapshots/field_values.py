@@ -50,10 +50,9 @@ class FieldValues:
 
     def __init__(self, line: RecordedLine, points: np.ndarray) -> None:
         self._height = points[:, 2]
-        self._slope = line.slope if line.slope.size else np.zeros(len(points))
-        self._stiffness = line.bending_stiffness
-        self._axial = line.axial_stiffness
-        self._lateral, self._curve = line.lateral, line.curve
+        self._slope = line.slope
+        self._wires = {wire.name: wire for wire in line.line.wires}
+        self._lateral, self._curve = line.lateral, line.line.curve
 
     def of(self, kind: FieldKind, slots: Slots, first: int, known: Gathered) -> np.ndarray:
         """Values of the field ``kind`` in the block of ``slots`` at the snapshots that are
@@ -97,9 +96,12 @@ class FieldValues:
 
     def _tension(self, block: Block, known: Gathered) -> np.ndarray:
         """Tension ahead of the points of a wire, (rows, n) [N]."""
-        nodes, axial = block.nodes, self._axial.get(block.name)
+        nodes = block.nodes
         tension = np.stack(known.tension)[:, nodes]
-        if (ALONG, False) not in known.motions or axial is None:
+        if (ALONG, False) not in known.motions:
+            return tension
+        axial = self._wires[block.name].axial_stiffness
+        if not axial:
             return tension
         along = known.motions[ALONG, False][:, nodes]
         length = np.diff(block.points[:, 0])
@@ -134,7 +136,7 @@ class FieldValues:
         height = self._height[nodes] + known.motions[UP, False][:, nodes]
         slope = self._slope[nodes] + known.motions[SLOPE, False][:, nodes]
         moment = curvature(block.points[:, 0], height, slope, block.breaks)
-        moment *= self._stiffness.get(block.name, 0.0)
+        moment *= self._wires[block.name].bending_stiffness
         return moment
 
 

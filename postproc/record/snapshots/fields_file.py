@@ -96,7 +96,7 @@ class FieldsFile:
         self._plan(numbers)
         try:
             with opened(self._made_as, "w") as file:
-                reserve(file.id.get_vfd_handle(), 0, self._n_bytes())
+                reserve(file, self._n_bytes())
                 self._write_tables(file)
                 self._find_places(file)
         except BaseException:

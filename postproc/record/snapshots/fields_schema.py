@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
 from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, largest
-from catenary.postproc.read.validation import read_attributes, values_fault
+from catenary.postproc.read.validation import read_attributes, table_values
 from catenary.postproc.record.snapshots.blocks import FIXED, OTHER_PARTS
 from catenary.postproc.record.snapshots.field_kinds import KINDS, FieldKind
 from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, SIZES, BlockTables
@@ -133,14 +133,10 @@ def _table(
 
 def _read(file: h5py.File, path: str, declared: Table, sizes: dict[str, int]) -> np.ndarray:
     """The values of a table as it is declared; ``sizes`` of dimensions are added."""
-    table = _table(file, path, None, (None,) * len(declared.dimensions))
-    try:
-        values = np.asarray(table[...])
-    except (*HDF5_ERRORS, MemoryError) as error:
-        raise FieldsFault(f"{path} cannot be read") from error
-    fault = values_fault(values, declared, sizes)
-    if fault:
-        raise FieldsFault(f"{path} {fault}")
+    _table(file, path, None, (None,) * len(declared.dimensions))
+    values, fault = table_values(file, path, declared, sizes)
+    if values is None:
+        raise FieldsFault(fault)
     return values
 
 

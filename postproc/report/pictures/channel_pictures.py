@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.files.own_files import CHANNEL_PICTURE
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
+from catenary.postproc.report.pictures.envelope import thinned
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     colour,
@@ -20,9 +19,8 @@ from catenary.postproc.report.pictures.figures import (
     own_style,
     stacked,
     tidy,
-    uprights,
 )
-from catenary.postproc.report.pictures.marks import mark_line, panels_along_track, still_marks
+from catenary.postproc.report.pictures.marks import draw_ranges, mark_line, panels_along_track
 from catenary.solver.time_loop.views.channels import (
     ARM,
     CHANNELS,
@@ -89,10 +87,7 @@ def _on_line(results: Results, channel: Channel) -> Figure:
     low, high = results.extremes(channel.name)
     figure, (axes,) = stacked(3.4, 1)
     mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
-    drawn = thinned_ranges(low, high)
-    how: Any = {"color": COLOURS[0], "linewidth": 1.6, "label": "range over the run"}
-    uprights(axes, x[drawn], low[drawn], high[drawn], **how)
-    still_marks(axes, x, low, high)
+    draw_ranges(axes, x, low, high)
     tidy(axes, "position along the track [m]", _label(channel))
     legend_above(axes)
     return figure

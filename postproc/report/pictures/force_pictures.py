@@ -186,7 +186,7 @@ def wire_forces(results: Results) -> Figure:
 
 
 @own_style()
-def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
+def force_statistics(statistics: RunStatistics) -> Figure:
     """Bars of mean, deviation, extremes and mean +- 3 sigma of each pantograph."""
     groups = ("mean", "std", "maximum", "minimum", "stat_max", "stat_min")
     labels = (
@@ -217,7 +217,7 @@ def force_statistics(results: Results, statistics: RunStatistics) -> Figure:
 
 
 @own_style()
-def force_histogram(results: Results, statistics: RunStatistics) -> Figure:
+def force_histogram(statistics: RunStatistics) -> Figure:
     """Share of time that the 20 Hz force of each pantograph spends in each bin."""
     shown = [(i, p) for i, p in enumerate(statistics.pantographs) if not p.complaint]
     figure, (axes,) = stacked(3.2, 1)

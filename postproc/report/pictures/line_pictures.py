@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
+from catenary.postproc.report.pictures.envelope import thinned
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     GREY,
@@ -28,7 +28,7 @@ from catenary.postproc.report.pictures.figures import (
     tidy,
     uprights,
 )
-from catenary.postproc.report.pictures.marks import mark_line, mark_static, still_marks, with_margin
+from catenary.postproc.report.pictures.marks import draw_ranges, mark_line, mark_static, with_margin
 from catenary.solver.waves.excitation import Blow, excitation_of_facts
 
 if TYPE_CHECKING:
@@ -157,17 +157,7 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     legend_above(history)
 
     mark_line(along, results, *with_margin(x))
-    drawn = thinned_ranges(droppers.lowest, droppers.highest)
-    uprights(
-        along,
-        x[drawn],
-        droppers.lowest[drawn],
-        droppers.highest[drawn],
-        color=COLOURS[0],
-        linewidth=1.6,
-        label="range over the run",
-    )
-    still_marks(along, x, droppers.lowest, droppers.highest)
+    draw_ranges(along, x, droppers.lowest, droppers.highest)
     slack = droppers.lowest <= 0.0
     along.plot(x[slack], droppers.lowest[slack], "v", color=LIMIT, ms=4, label="slackened")
     along.axhline(0.0, color=GREY, linewidth=0.8)

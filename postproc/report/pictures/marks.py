@@ -15,7 +15,7 @@ from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures.envelope import thinned, thinned_ranges
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     GREY,
@@ -106,49 +106,42 @@ def mark_line(
     low, high = results.evaluation
     label = "evaluation stretch" if named else None
     axes.axvspan(low, high, color=SHADE, zorder=0, label=label)
-    support = results.line("support_x")
-    _supports(axes, support[in_stretch(support, start, end)], 0.9, "support" if named else None)
-    dropper = results.line("dropper_x")
-    dropper = dropper[in_stretch(dropper, start, end)]
-    if 0 < dropper.size <= _MOST_DROPPERS:
-        _ticks(axes, dropper, 0.035, 0.7, "dropper" if named else None)
+    _mark_parts(axes, results, start, end, named)
     axes.set_xlim(start, end)
-
-
-def _ticks(axes: Axes, dropper: np.ndarray, height: float, width: float, label: str | None) -> None:
-    """Droppers as ticks at the bottom of a panel, of a height in shares of it."""
-    transform = axes.get_xaxis_transform()
-    uprights(axes, dropper, 0.0, height, color=GREY, linewidth=width, transform=transform)
-    axes.plot([], [], "|", color=GREY, markersize=5, label=label)
-
-
-def still_marks(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    """Dashes at places ``x`` (n,) where ranges from ``low`` to ``high`` (n,) are too small for a
-    line that would be seen."""
-    still = high - low < 0.01 * (np.nanmax(high, initial=0.0) - np.nanmin(low, initial=0.0))
-    axes.plot(x[still], high[still], "_", color=COLOURS[0], ms=3.0)
 
 
 def mark_static(axes: Axes, results: Results, start: float, end: float) -> None:
     """Supports and droppers of the line at rest from ``start`` to ``end`` [m], with a margin at
     both ends."""
-    support = results.line("support_x")
-    _supports(axes, support[in_stretch(support, start, end)], 1.2, "support")
-    dropper = results.line("dropper_x")
-    dropper = dropper[in_stretch(dropper, start, end)]
-    if dropper.size:
-        _ticks(axes, dropper, 0.06, 1.0, "dropper")
+    _mark_parts(axes, results, start, end, named=True)
     axes.set_xlim(*with_margin(np.array([start, end])))
 
 
-def _supports(axes: Axes, support: np.ndarray, width: float, label: str | None) -> None:
-    """Supports as lines over the whole height, in one collection."""
-    if not 0 < support.size <= _MOST_SUPPORTS:
-        return
-    lines = [((x, 0.0), (x, 1.0)) for x in support]
+def _mark_parts(axes: Axes, results: Results, start: float, end: float, named: bool) -> None:
+    """Supports as lines over the whole height, in one collection, and droppers as ticks at the
+    bottom, where they are not too many."""
+    support, dropper = results.line("support_x"), results.line("dropper_x")
+    support = support[in_stretch(support, start, end)]
+    dropper = dropper[in_stretch(dropper, start, end)]
     transform = axes.get_xaxis_transform()
-    known: dict[str, Any] = {"colors": LIGHT, "linewidths": width, "zorder": 1, "label": label}
-    axes.add_collection(LineCollection(lines, transform=transform, **known), autolim=False)
+    if 0 < support.size <= _MOST_SUPPORTS:
+        lines = [((x, 0.0), (x, 1.0)) for x in support]
+        known: dict[str, Any] = {"colors": LIGHT, "linewidths": 0.9, "zorder": 1}
+        known |= {"label": "support" if named else None, "transform": transform}
+        axes.add_collection(LineCollection(lines, **known), autolim=False)
+    if 0 < dropper.size <= _MOST_DROPPERS:
+        uprights(axes, dropper, 0.0, 0.035, color=GREY, linewidth=0.7, transform=transform)
+        axes.plot([], [], "|", color=GREY, markersize=5, label="dropper" if named else None)
+
+
+def draw_ranges(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """Ranges over the run from ``low`` to ``high`` (n,) at places ``x`` (n,) as upright lines, with
+    dashes where they are too small for a line that would be seen."""
+    drawn = thinned_ranges(low, high)
+    how: dict[str, Any] = {"color": COLOURS[0], "linewidth": 1.6, "label": "range over the run"}
+    uprights(axes, x[drawn], low[drawn], high[drawn], **how)
+    still = high - low < 0.01 * (np.nanmax(high, initial=0.0) - np.nanmin(low, initial=0.0))
+    axes.plot(x[still], high[still], "_", color=COLOURS[0], ms=3.0)
 
 
 def title_of(results: Results, pantograph: int) -> str:

@@ -45,7 +45,7 @@ def _status(run: EvaluatedRun) -> Iterator[Text]:
     if run.excitation:
         yield Text("Something other than a train excites the line.", "open", "Nothing is judged.")
         return
-    by = judged_by(results, list(run.criteria))
+    by = judged_by(results, run.criteria)
     if run.verdict is None:
         yield Text(
             f"No criterion failed, but some could not be judged. {by}.", "open", "Not judged."

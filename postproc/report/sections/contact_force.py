@@ -71,7 +71,7 @@ def _pictures(run: EvaluatedRun) -> Iterator[Picture]:
     known = len(statistics.pantographs) - len(statistics.complaints)
     if known > 1:  # of one the table says it all
         text = "Contact force in the evaluation stretch."
-        yield Picture("statistics", text, lambda: forces.force_statistics(results, statistics))
+        yield Picture("statistics", text, lambda: forces.force_statistics(statistics))
     if known:
         text = "Distribution of the contact force in the evaluation stretch."
-        yield Picture("histogram", text, lambda: forces.force_histogram(results, statistics))
+        yield Picture("histogram", text, lambda: forces.force_histogram(statistics))

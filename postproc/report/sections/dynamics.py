@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.evaluate.wording import wire_words
@@ -57,12 +58,14 @@ def _blocks(run: EvaluatedRun) -> Iterator[Text | StudyTable]:
 
 
 def passing_lengths(results: Results) -> dict[str, float]:
-    """Lengths by which the line repeats [m]: of spans, and between droppers if it has any."""
+    """Lengths by which the line repeats [m]: of spans, and between droppers of contact wires if it
+    has any."""
     masts = results.line("support_x")
     found = {"span": float(np.median(np.diff(masts)))}
-    own = np.unique(
-        results.line("dropper_x")[results.line("dropper_span") == results.reference_span]
-    )
+    is_contact = np.array([role is Role.CONTACT for role in results.roles.values()])
+    chosen = is_contact[results.dropper_wires()[:, 1]]
+    chosen &= results.line("dropper_span") == results.reference_span
+    own = np.unique(results.line("dropper_x")[chosen])
     if own.size > 1:
         found["dropper"] = float(np.median(np.diff(own)))
     return found

@@ -150,7 +150,5 @@ def _lateral(results: Results) -> Iterator[Text]:
 def _registration(results: Results) -> Iterator[Folded]:
     found = results.registration()
     assert found is not None
-    heads = ["position [m]", "stagger [m]", "radial force [N]", "lift [N]", "slope [deg]"]
-    heads += ["force along the track [N]", "slew [deg]", *(["wire"] if found.wires else [])]
     title = f"Registration: {len(found.x)} steady arms, also in registration.csv"
-    yield Folded(title, texts_table(heads, list(found.rows()), set(range(7))))
+    yield Folded(title, texts_table(found.heads, found.rows(), set(range(7))))

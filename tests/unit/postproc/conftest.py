@@ -177,7 +177,7 @@ class March:
         self.mesh = make_mesh(self.line)
         self.arm_x = self.mesh.x(self.mesh.steady_arms)
         self.dropper_x = self.mesh.x(self.mesh.droppers[:, 1])
-        self.recorded = RecordedLine.of(self.line, self.mesh, np.zeros(self.mesh.n_nodes))
+        self.recorded = RecordedLine(self.line, self.mesh, np.zeros(self.mesh.n_nodes))
         self.tension = 1000.0 * np.arange(self.mesh.n_nodes)
         own_arms = self.arm_x[self.own(self.arm_x.size)]
         own_droppers = self.dropper_x[self.own(self.dropper_x.size)]

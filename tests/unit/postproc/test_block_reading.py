@@ -13,12 +13,14 @@ import pytest
 from scipy import signal
 
 import catenary
-from catenary.postproc.evaluate import filters
+from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.evaluate import filters, passages
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.files.hdf5 import table_rows
 from catenary.postproc.files.kept_extremes import store_extremes
 from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.read import records
+from catenary.postproc.read.line_of_run import in_stretch
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import envelope
 
@@ -54,6 +56,30 @@ def test_columns_and_extremes_are_those_of_the_whole_table(
             np.testing.assert_array_equal(np.concatenate([rows for _, rows in blocks]), whole)
             part = slice(1234, 5678)
             np.testing.assert_array_equal(results.column(name, 1, part), whole[part, 1])
+
+
+@pytest.mark.parametrize(
+    "record", [LineRecord(), LineRecord(every=5, window=(150.0, 60.0))], ids=["whole", "thinned"]
+)
+def test_slack_droppers_are_those_of_whole_tables(
+    tmp_path: Path, march: Any, record_run: Any, monkeypatch: pytest.MonkeyPatch, record: LineRecord
+) -> None:
+    """Before the last pantograph and in or after its passage, read in many blocks."""
+    monkeypatch.setattr(table_rows, "BLOCK_BYTES", 1e5)
+    monkeypatch.setattr(table_rows, "COLUMNS_AT_ONCE", 7)
+    record_run(tmp_path / "run.h5", march, record=record)
+    with Results(tmp_path) as results:
+        found, x = passages.slack_droppers(results)["all"], results.line("dropper_x")
+        slack = results.channel("dropper_force") <= 0.0
+        last = results.channel("contact_position").min(axis=1)[:: record.every]
+        inside = in_stretch(x, *results.evaluation)
+    after = last[:, None] >= x - passages.AHEAD
+    before, behind = ((slack & own).any(axis=0) & inside for own in (~after, after))
+    assert found == {
+        "leading": before.sum(), "trailing": behind.sum(), "any": (before | behind).sum(),
+        "of": inside.sum(),
+    }  # fmt: skip
+    assert 0 < found["leading"] and 0 < found["trailing"]
 
 
 def test_a_thinned_curve_keeps_every_peak() -> None:

@@ -24,7 +24,7 @@ from catenary.postproc.channels.header import (
 )
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.film.film_data import film_data
-from catenary.postproc.read.line_of_run import LineOfRun
+from catenary.postproc.read.line_of_run import ContactProfile, LineOfRun
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report import csv_tables
@@ -141,19 +141,14 @@ def test_the_span_that_is_shown_has_the_usual_wires() -> None:
 
         def __init__(self, middle: float) -> None:
             self.evaluation = (middle - 10.0, middle + 10.0)
-            self.points = np.array([[x, 0.0, 5.0] for x in (0, 50, 100, 150, 101, 150, 200, 250)])
 
         def line(self, name: str) -> np.ndarray:
-            return {"support_x": np.arange(0.0, 251.0, 50.0), "node_points": self.points}[name]
+            return {"support_x": np.arange(0.0, 251.0, 50.0)}[name]
 
-        def elements(self) -> dict[str, np.ndarray]:
-            return {
-                FIRST: np.array([[0, 1], [1, 2], [2, 3]]),
-                SECOND: np.array([[4, 5], [5, 6], [6, 7]]),
-            }
-
-        def wires_of(self, role: Role) -> list[str]:
-            return [FIRST, SECOND]
+        def contact_profiles(self) -> dict[str, ContactProfile]:
+            x = {FIRST: [0.0, 50.0, 100.0, 150.0], SECOND: [101.0, 150.0, 200.0, 250.0]}
+            none = np.zeros(0, dtype=int)
+            return {n: ContactProfile(none, np.array(own), np.full(4, 5.0)) for n, own in x.items()}
 
     shown = {middle: Overlapping(middle).reference_span for middle in (70.0, 120.0, 130.0, 220.0)}
     assert shown == {70.0: 1, 120.0: 1, 130.0: 3, 220.0: 4}

@@ -110,10 +110,10 @@ def test_colours_are_as_given() -> None:
 def test_ranges_too_small_for_a_line_are_dashes() -> None:
     _, (axes,) = figures.stacked(3.0, 1)
     x = np.array([1.0, 2.0, 3.0, 4.0])
-    marks.still_marks(
+    marks.draw_ranges(
         axes, x, np.array([0.0, 60.0, 59.5, 60.0]), np.array([200.0, 60.0, 60.0, 63.0])
     )
-    (dashes,) = axes.lines
+    _, dashes = axes.lines
     np.testing.assert_array_equal(dashes.get_xydata(), [[2.0, 60.0], [3.0, 60.0]])
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import functools
+import itertools
 import json
+import os
 import resource
 import shutil
 import weakref
@@ -18,7 +21,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from catenary import InputError
+from catenary import InputError, RunBroken
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import HEAD, shape_of
 from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute
@@ -376,6 +379,8 @@ def test_pictures_are_equally_far_apart_along_the_track() -> None:
     times = animate.times_of_pictures(shown, 80.0, 1.0)
     np.testing.assert_allclose(80.0 * np.diff(times), 1.0)
     assert times[0] == 0.0 and times[-1] == pytest.approx(1.0)
+    # Farther than the train travels, the begin and the end.
+    np.testing.assert_allclose(animate.times_of_pictures(shown, 80.0, 1e4), [0.0, 1.0])
     # Too far apart to be interpolated, and nothing that travels.
     for speed in (120.0, 0.0):
         np.testing.assert_array_equal(animate.times_of_pictures(shown, speed, 1.0), shown)
@@ -546,7 +551,7 @@ def test_a_film_is_whole_or_not_there(folder: Path, monkeypatch: pytest.MonkeyPa
 
     with monkeypatch.context() as patch:
         patch.setattr(video, "_encode", broken)
-        with pytest.raises(InputError, match="No space left"):
+        with pytest.raises(RunBroken, match="No space left"):
             animate.animate(folder, FilmOptions(), None, progress=False)
     assert (folder / "film.mp4").read_bytes() == b"an earlier film"
     assert not list(folder.glob(".film*"))
@@ -636,6 +641,22 @@ def test_droppers_that_are_missing_or_broke_are_not_drawn(folder: Path) -> None:
     np.testing.assert_allclose(x[~drawn & (x < 200.0)], [60.0, 115.0])
 
 
+@pytest.mark.parametrize(
+    ("low", "numbers"), [(-37.0, [-37.0, 0.0, 85.0]), (-7.4, [-7.4, 85.0]), (0.0, [0.0, 85.0])]
+)
+def test_numbers_below_a_scale_of_colours_do_not_touch(
+    folder: Path, low: float, numbers: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends = projection.Colours(2, "uplift", 1e-3 * low, 0.085)
+    monkeypatch.setattr(projection.Picture, "colours", lambda *_: ends)
+    with pictures_of(folder, FilmOptions()) as made:
+        made.drawing.pixels()
+        below = made.drawing.figure.axes[2].xaxis
+        assert below.get_majorticklocs() == pytest.approx(numbers)
+        boxes = [text.get_window_extent() for text in below.get_ticklabels()]
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
+
+
 def test_a_gif_has_colours_that_come_later(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     first = rng.integers(0, 100, (90, 160, 4), dtype=np.uint8)
@@ -652,8 +673,22 @@ def test_a_gif_has_colours_that_come_later(tmp_path: Path) -> None:
 def test_what_ffmpeg_says_is_told(tmp_path: Path) -> None:
     picture = np.zeros((90, 160, 4), dtype=np.uint8)
     files = tmp_path / "nowhere" / "film.mp4", tmp_path / "nowhere" / "film.gif"
-    with pytest.raises(InputError, match="nowhere: .*No such file or directory"):
+    with pytest.raises(RunBroken, match=r"nowhere/film.mp4 failed \(.*No such file or directory"):
         video.write([picture] * 3, (160, 90), 10.0, *files)
+
+
+def test_a_folder_without_write_access_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On such a disk the removal of files that are not there fails too."""
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    files = tmp_path / "film.mp4", tmp_path / "film.gif"
+    with pytest.raises(RunBroken, match="Read-only file system.*choose another output folder"):
+        video.write([np.zeros((90, 160, 4), dtype=np.uint8)], (160, 90), 10.0, *files)
 
 
 @pytest.mark.study

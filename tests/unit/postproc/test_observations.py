@@ -281,6 +281,22 @@ def test_every_reader_of_a_run_tells_the_same_list(
     assert "edition" not in summary
 
 
+def test_of_a_part_of_the_passage_limits_are_exceeded_but_not_kept(
+    tmp_path: Path, make_march: Any, record_run: Any
+) -> None:
+    """Uplift and droppers' forces grow as pantographs pass: half a passage proves no maximum."""
+    march = make_march(separations=(0.0,), n_steps=1500, dt=2e-3)
+    for limit, verdict in ((1.0, False), (400.0, None)):
+        about = {"rules": ["line"], "limits": {"uplift_space_mm": limit, "dropper_force_N": limit}}
+        record_run(tmp_path / "run.h5", march, attributes=about)
+        with Results(tmp_path) as results:
+            found = by_rule(criteria_of(results, statistics.evaluate(results)), "line")
+        for rule in ("uplift_space", "dropper_force"):
+            assert found[rule].passed is verdict and found[rule].value > 1.0
+            reason = "" if verdict is False else "the record does not cover the evaluation stretch"
+            assert found[rule].because == reason
+
+
 @pytest.mark.parametrize(("effects", "limit"), [([], 90.0), (["uplift_stops"], 120.0)])
 def test_a_stop_is_seen_by_its_effect(
     tmp_path: Path, make_march: Any, record_run: Any, effects: list[str], limit: float

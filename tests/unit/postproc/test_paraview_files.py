@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import runpy
+import subprocess
 import sys
 import types
 from pathlib import Path
@@ -17,7 +18,7 @@ import pyvista
 from matplotlib.colors import to_rgb
 from studies import few
 
-from catenary import InputError
+from catenary import RunBroken
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import MOTIONS
@@ -162,5 +163,23 @@ def test_the_script_runs_from_end_to_end(
 
 def test_a_folder_that_cannot_be_written_is_named(folder: Path) -> None:
     (folder / "paraview").write_text("a file in the way")
-    with pytest.raises(InputError, match="paraview cannot be written"):
+    with pytest.raises(RunBroken, match=r"writing .*paraview failed \(File exists\)"):
         open_in_paraview.write_script(folder, None)
+
+
+@pytest.mark.process
+def test_a_full_disk_ends_with_a_sentence(folder: Path) -> None:
+    """And not with a crash: HDF5 would write again at the end of the program."""
+    script = (
+        "import resource, sys\nfrom pathlib import Path\n"
+        "from catenary.postproc.paraview.open_in_paraview import write_script\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, resource.RLIM_INFINITY))\n"
+        "write_script(Path(sys.argv[1]), None)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(folder)], capture_output=True, text=True
+    )
+    last = done.stderr.strip().splitlines()[-1]
+    assert done.returncode == 1, last
+    assert "RunBroken: writing" in last and "paraview failed (File too large)" in last
+    assert not list((folder / "paraview").iterdir())

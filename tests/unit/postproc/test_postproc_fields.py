@@ -12,7 +12,7 @@ import pyvista
 from watched_fields import BLOCKS, blocks_at, times_in, watch
 
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
-from catenary.postproc.record.snapshots.blocks import ARMS, MASTS, RecordedLine, blocks_of
+from catenary.postproc.record.snapshots.blocks import ARMS, MASTS, blocks_of
 from catenary.postproc.record.snapshots.field_kinds import FIELDS
 from catenary.postproc.record.snapshots.field_layout import BlockTables, Course, FieldRecord
 from catenary.postproc.record.snapshots.field_values import curvature
@@ -202,8 +202,9 @@ def test_pieces_of_a_wire_stay_apart_in_a_window(tmp_path: Path, make_march: Any
     march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
     nodes = march.mesh.wires[CONTACT_WIRE]
     breaks = np.array([40, 41, 55])
-    line = RecordedLine({"cut": nodes}, breaks={"cut": breaks})
-    (block,) = blocks_of(line, march.mesh.points)
+    mesh = dataclasses.replace(march.mesh, wires={"cut": nodes}, breaks={"cut": breaks})
+    line = march.recorded._replace(mesh=mesh)
+    block = blocks_of(line, march.mesh.points)[0]
     low, high = block.points[[35, 60], 0]
     record = FieldRecord(window=(0.0, high - low), course=Course(low, low, 30.0))
     recorder = FieldRecorder(march.comm, path, line, every=50, record=record)

@@ -123,16 +123,6 @@ def test_a_line_without_arms_or_droppers_is_recorded(tmp_path: Path, make_march:
         assert results.channel("arm_uplift").shape == (31, 0)
 
 
-def test_a_header_that_lacks_something_names_it(make_march: Any) -> None:
-    header = make_march().header()
-    attributes = {k: v for k, v in header.attributes.items() if k != "config"}
-    with pytest.raises(ValueError, match="lacks config"):
-        Header(attributes, header.datasets, header.facts)
-    facts = {name: value for name, value in header.facts.items() if name != "speed"}
-    with pytest.raises(ValueError, match="lacks speed"):
-        Header(header.attributes, header.datasets, facts)
-
-
 def test_a_column_with_two_owners_is_refused(tmp_path: Path, make_march: Any) -> None:
     march = make_march()
     march.own = lambda count: np.zeros(count, dtype=int)

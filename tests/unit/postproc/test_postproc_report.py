@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import csv
+import io
 import json
 import re
 from html.parser import HTMLParser
@@ -11,14 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pypdf
 import pytest
 
 import catenary.postproc.report.page
 from catenary import InputError
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
+from catenary.postproc.report.page import page, pdf
 from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
+from catenary.postproc.report.sections.section import Section
+from catenary.postproc.report.study_table import texts_table
 
 TEMPLATES = Path(catenary.postproc.report.page.__file__).parent / "templates"
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -145,6 +150,20 @@ def test_pages_are_printed_on_a4() -> None:
     printed = template[template.index("@media print") :]
     assert ".scroll { overflow: visible; }" in printed
     assert ("<pre" in template) == ("white-space: pre-wrap" in printed)
+
+
+@pytest.mark.process
+def test_a_wide_table_ends_within_the_margins_of_its_sheet() -> None:
+    """Its heads take several lines, and units stay whole: texts begin before the margin of 15 mm,
+    which is 737 of 794 pixels of CSS from the left."""
+    heads = [f"damping of wire {n} [1/s]" for n in range(9)]
+    table = texts_table(heads, [["0.01"] * 9], range(9))
+    html = page("title", "", [Section("Wires", [table])], {})
+    assert "damping of wire 0 <span>[1/s]</span>" in html
+    places: list[float] = []
+    (sheet,) = pypdf.PdfReader(io.BytesIO(pdf(html))).pages
+    sheet.extract_text(visitor_operand_before=lambda *found: places.append(found[3][4]))
+    assert 600.0 < max(places) < 737.0
 
 
 def test_report_says_what_was_found(report_folder: Path, march: Any) -> None:

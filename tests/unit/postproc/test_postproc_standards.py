@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,10 +17,10 @@ from catenary.postproc.evaluate.observations import Observation
 from catenary.postproc.evaluate.verdict import (
     Criterion,
     judge,
+    judged_by,
     labels,
     quantities_of,
     verdict,
-    verdict_sentence,
 )
 from catenary.postproc.standards.book import Conditions
 from catenary.postproc.standards.library import book_named, books_of_entries, shipped
@@ -352,14 +354,15 @@ def test_the_rule_on_speed_says_where_it_is_taken_over() -> None:
 
 
 def test_the_verdict_counts_what_it_rests_on() -> None:
+    on_ac: Any = SimpleNamespace(attributes={"system": "ac"})
     criteria = list(judged("tsi_ene", {"arcing": 0.3}, keys={}).values())
-    assert verdict_sentence(criteria, "ac") == (
+    assert judged_by(on_ac, criteria) == (
         "TSI Energy (EU) 1301/2014, 2023 (AC): 5 of 6 criteria passed, 3 not judged; 6 of 6 "
         "limits not compared with the text of their standard"
     )
     mixed = [*criteria, *judged("bane_nor").values()]
     # Which of several books a line fails is told: their titles hold commas.
-    assert verdict_sentence(mixed, "ac") == (
+    assert judged_by(on_ac, mixed) == (
         "TSI Energy (EU) 1301/2014, 2023 (5 of 6) and Bane NOR, teknisk regelverk, System 25 "
         "(3 of 3) (AC): 8 of 9 criteria passed, 3 not judged; 6 of 9 limits not compared with the "
         "text of their standard"

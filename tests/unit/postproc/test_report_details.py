@@ -51,6 +51,17 @@ def test_spectrum_has_the_power_of_each_part(run_folder: Path) -> None:
     assert "dropper passing, 16.67 Hz and multiples" in curves
 
 
+def test_droppers_that_carry_no_contact_wire_pass_nothing(
+    run_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As those of a compound line between messenger and auxiliary wire: of each two, one here."""
+    with Results(run_folder) as results:
+        wires = results.dropper_wires()
+        wires[::2, 1] = list(results.roles).index("messenger_wire")
+        monkeypatch.setattr(results, "dropper_wires", lambda: wires)
+        assert dynamics.passing_lengths(results)["dropper"] == pytest.approx(10.0)
+
+
 def test_gradient_of_the_contact_point(run_folder: Path) -> None:
     """Of 15 mm over 50 m: 2 pi 15 mm / 50 m; filter and steps of 83 mm change 1e-4 of it."""
     with Results(run_folder) as results:
