@@ -39,7 +39,7 @@ def test_differences_are_those_of_runs_by_hand(folder: Path) -> None:
     before, after = catenary.run(scene), catenary.run(scene.replace(train={"speed_km_h": 320}))
     table = {row["statistic"]: row for row in rows(folder / "statistics.csv")}
     for label, name in (
-        ("mean force [N]", "mean_N"),
+        ("mean contact force [N]", "mean_N"),
         ("standard deviation, 0-20 Hz [N]", "std_N"),
         ("minimum force [N]", "min_N"),
         ("contact point, vertical range [mm]", "contact_height_range_mm"),

@@ -19,7 +19,14 @@ from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
 from catenary.cases.studies.accuracy.axes import Axis, Level, Reference
-from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions, all_ended
+from catenary.cases.studies.sweep.jobs import (
+    AS_USUAL,
+    Ended,
+    Job,
+    RunOptions,
+    all_ended,
+    statistics_of,
+)
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, slug
 from catenary.postproc.evaluate import filters
@@ -328,8 +335,7 @@ def _found(one: Ended) -> Found | None:
     if not one.done:
         return None
     histories = [np.array(values) for values in one.measured["histories"]]
-    uplift = one.summary["supports"]["max_uplift_mm"]
-    return Found(one.summary["pantographs"], uplift, histories)
+    return Found(statistics_of(one.summary), histories)
 
 
 def _cost(one: Ended) -> float:

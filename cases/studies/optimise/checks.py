@@ -12,7 +12,6 @@ from catenary.cases.scene.turned import DIRECTIONS
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.scene_sets import (
     BROKE,
-    OF_EACH_PANTOGRAPH,
     ErrorSamples,
     Evaluation,
     Member,
@@ -20,13 +19,13 @@ from catenary.cases.studies.scene_sets import (
     Wanted,
     members_of,
 )
+from catenary.cases.studies.sweep.jobs import statistics_of
 
 AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN = "as it is", "mesh x 2", "step / 2", "unseen errors"
 # Statistics that are compared, and the direction in which each gets worse.
 COMPARED = {"std_N": 1.0, "max_N": 1.0, "min_N": -1.0, "loss_percent": 1.0, "max_uplift_mm": 1.0}
 # Changes below this share, or this much of a percentage, are no change.
 _SAME = 0.005
-_OF_LINE = "max_uplift_mm"
 
 
 class Check(NamedTuple):
@@ -150,15 +149,13 @@ def _rows(
     )
     failed = sorted(after - before)
     return [
-        Row(*head, its["name"], _figures(one, own), _figures(other, its), failed)
-        for own, its in zip(one["pantographs"], other["pantographs"], strict=True)
+        Row(*head, its["pantograph"], _compared(own), _compared(its), failed)
+        for own, its in zip(statistics_of(one), statistics_of(other), strict=True)
     ]
 
 
-def _figures(summary: Mapping[str, Any], pantograph: Mapping[str, Any]) -> dict[str, float]:
-    found = {name: pantograph[name] for name in COMPARED if name in OF_EACH_PANTOGRAPH}
-    found[_OF_LINE] = summary["supports"][_OF_LINE]
-    return {name: value for name, value in found.items() if value is not None}
+def _compared(figures: Mapping[str, Any]) -> dict[str, float]:
+    return {name: figures[name] for name in COMPARED if figures[name] is not None}
 
 
 def change(row: Row, statistic: str) -> float:

@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.jobs import Ended
+from catenary.cases.studies.sweep.jobs import Ended, statistics_of
 from catenary.cases.studies.sweep.output import failed_criteria
 from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import Variant, text_of
@@ -174,12 +174,15 @@ def variant_of(scene: Scene, separation: float | None) -> Variant:
 
 def _row(separation: float | None, one: Ended) -> Row:
     row: dict[str, Any] = {DISTANCE: separation, "outcome": one.outcome}
-    found = one.summary.get("pantographs", [])
+    found = statistics_of(one.summary)
     for number, place in enumerate(PLACES):
         for name, _, _, key in _OF_BOTH:
             row[name.format(place)] = found[number][key] if number < len(found) else None
-    uplift = one.summary.get("supports", {}).get(_UPLIFT)
-    return row | {_UPLIFT: uplift, "failed": failed_criteria(one.summary), "remarks": one.remarks}
+    return row | {
+        _UPLIFT: found[0][_UPLIFT],
+        "failed": failed_criteria(one.summary),
+        "remarks": one.remarks,
+    }
 
 
 class Period(NamedTuple):

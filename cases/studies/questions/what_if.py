@@ -13,12 +13,23 @@ from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import parse_assignment
-from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, all_done, all_ended, make_jobs
+from catenary.cases.studies.sweep.jobs import (
+    OF_LINE,
+    OF_PANTOGRAPH,
+    Ended,
+    Job,
+    RunOptions,
+    all_done,
+    all_ended,
+    make_jobs,
+    statistics_of,
+)
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, check_keys
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.statistics import RunStatistics, slack_times
+from catenary.postproc.evaluate.statistics import slack_times
+from catenary.postproc.files.disk import plain
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures, overlays
@@ -33,16 +44,6 @@ _MOST_CHANGED = 3  # arms and droppers named on a terminal
 _VERDICTS = {None: "not judged", True: "passed", False: "failed"}
 # Arms and droppers are the same ones in both runs where they stand so close [m].
 _SAME_PLACE = 1e-6
-_OF_FORCE = (
-    ("mean", "mean force [N]", 1.0),
-    ("std", "standard deviation, 0-20 Hz [N]", 1.0),
-    ("std_0_5", "standard deviation, 0-5 Hz [N]", 1.0),
-    ("std_5_20", "standard deviation, 5-20 Hz [N]", 1.0),
-    ("maximum", "maximum force [N]", 1.0),
-    ("minimum", "minimum force [N]", 1.0),
-    ("loss_percent", "loss of contact [%]", 1.0),
-    ("contact_height_range", "contact point, vertical range [mm]", 1e3),
-)
 
 
 class Differences(NamedTuple):
@@ -117,7 +118,7 @@ def differences(changes: Sequence[str], ended: Sequence[Ended], out: Path) -> Di
         return Differences(
             str(a.attributes["case"]),
             tuple(changes),
-            _statistics(of_a, of_b),
+            _statistics(before.summary, after.summary),
             _by_place("Uplift by support", "arm", *arms, of_arms),
             _by_place("Droppers", "dropper", *droppers, of_droppers),
             _criteria(before.summary, after.summary),
@@ -133,30 +134,26 @@ def _columns(name: str, head: str, form: str) -> list[Column]:
     return [Column(*one) for one in zip(keys, heads, forms, strict=True)]
 
 
-def _figures(name: str, first: float, second: float) -> dict[str, Any]:
+def _figures(name: str, first: float | None, second: float | None) -> dict[str, Any]:
     """Two values and their difference as cells; None for what is not known."""
-    values = {AS_IT_IS: first, CHANGED: second, DIFFERENCE: second - first}
-    return {_key(name, key): value if np.isfinite(value) else None for key, value in values.items()}
+    difference = None if first is None or second is None else second - first
+    values = {AS_IT_IS: first, CHANGED: second, DIFFERENCE: difference}
+    return {_key(name, key): plain(value) for key, value in values.items()}
 
 
 def _key(name: str, of: str) -> str:
     return f"{name}_{of}" if name else of
 
 
-def _statistics(a: RunStatistics, b: RunStatistics) -> StudyTable:
-    rows: list[dict[str, Any]] = [
-        {"of": p.name, "statistic": label}
-        | _figures("", factor * getattr(p, name), factor * getattr(q, name))
-        for p, q in zip(a.pantographs, b.pantographs, strict=False)
-        for name, label, factor in _OF_FORCE
+def _statistics(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
+    pairs = list(zip(statistics_of(before), statistics_of(after), strict=False))
+    of_all = [(own["pantograph"], own, other, OF_PANTOGRAPH) for own, other in pairs]
+    rows = [
+        {"of": name, "statistic": column.meaning}
+        | _figures("", own[column.name], other[column.name])
+        for name, own, other, columns in [*of_all, ("line", *pairs[0], OF_LINE)]
+        for column in columns
     ]
-    of_line = (
-        ("largest uplift at arms [mm]", 1e3 * a.supports.maximum, 1e3 * b.supports.maximum),
-        ("droppers slackened", a.droppers.n_slackened, b.droppers.n_slackened),
-        ("maximum dropper force [N]", a.droppers.maximum, b.droppers.maximum),
-        ("minimum dropper force [N]", a.droppers.minimum, b.droppers.minimum),
-    )
-    rows += [{"of": "line", "statistic": name} | _figures("", *both) for name, *both in of_line]
     columns = [Column("of", "of"), Column("statistic", "statistic"), *_columns("", "", ".2f")]
     return StudyTable(columns, rows, "Statistics")
 
