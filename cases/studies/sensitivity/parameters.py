@@ -250,11 +250,10 @@ class ChangedScenes:
 
     def droppers(self) -> list[Parameter]:
         """The length of each dropper in the evaluated stretch."""
-        line, evaluation = line_of(self.scene), self.scene.evaluation
+        evaluation = self.scene.evaluation
         return [
-            self.parameter(f"{_LENGTHS}.{span + 1}.{number + 1}")
-            for span in range(line.n_spans)
-            for number, x in enumerate(line.droppers_of_span(span))
+            self.parameter(f"{_LENGTHS}.{span}.{number}")
+            for (span, number), x in line_of(self.scene).numbered_droppers.items()
             if evaluation.from_m <= x <= evaluation.to_m
         ]
 
@@ -266,12 +265,14 @@ class ChangedScenes:
         InputError
             If the line has no such span, or no droppers in it.
         """
-        line, found = line_of(self.scene), []
-        for span in dict.fromkeys(spans):
-            if span > line.n_spans:
-                raise InputError(f"droppers.spans names span {span}: the line has {line.n_spans}")
-            for number in range(1, len(line.droppers_of_span(span - 1)) + 1):
-                found.append(self.parameter(f"{_LENGTHS}.{span}.{number}"))
+        line = line_of(self.scene)
+        if max(spans) > line.n_spans:
+            raise InputError(f"droppers.spans names span {max(spans)}: the line has {line.n_spans}")
+        found = [
+            self.parameter(f"{_LENGTHS}.{span}.{number}")
+            for span in dict.fromkeys(spans)
+            for number in range(1, len(line.droppers_of_span(span - 1)) + 1)
+        ]
         if not found:
             raise InputError(f"droppers.spans names {list(spans)}: these spans have no droppers")
         return found
