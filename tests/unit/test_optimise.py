@@ -283,7 +283,7 @@ def test_a_short_search_is_checked_on_the_whole_stretch() -> None:
     (warning, _) = plan.warnings
     assert "shortened by its [test] table" in warning
     searched, checked = (
-        scenes.scene(scenes.members[0]) for scenes in (plan.scenes, plan.checks[0].scenes)
+        scenes.scene(scenes.members[0]) for scenes in (plan.scenes, plan.checks["as it is"])
     )
     whole, short = (one.scene().evaluation for one in (case, read_draft("ac_simple").shortened()))
     assert (searched.evaluation, checked.evaluation) == (short, whole) and short != whole
@@ -490,7 +490,7 @@ def test_a_search_may_be_coarser_than_its_checks() -> None:
     plan = study.make_plan(sagging(), task)
     member = plan.scenes.members[0]
     assert plan.scenes.scene(member).numerics.dt_s == 0.01
-    assert {own.scenes.scene(member).numerics.dt_s for own in plan.checks} == {0.005, 0.0025}
+    assert {own.scene(member).numerics.dt_s for own in plan.checks.values()} == {0.005, 0.0025}
     assert "numerics.dt_s=0.01" in plan.warnings[0]
     # 0.1 mm might be 0.1 m in the file of a case; a search means it.
     plan.scenes.scene(member, {"line.dropper.pre_sag_mm": [0.1, *SAG[1:]]})

@@ -47,25 +47,20 @@ _SAME_PLACE = 1e-6
 
 
 class Differences(NamedTuple):
-    """Differences by a change: tables with the columns ``as_it_is``, ``changed``, ``difference``.
+    """Differences by a change.
 
     Attributes
     ----------
     case : name of the case
     changes : the assignments
-    statistics : of each pantograph, and of the line
-    supports : largest uplift at each steady arm that both runs have
-    droppers : largest and smallest force, and time slack, of each dropper that both runs have
-    criteria : values, limits and verdicts
+    tables : by name, with the columns ``as_it_is``, ``changed`` and ``difference``: statistics,
+        verdicts, and of each steady arm and dropper that both runs have
     remarks : sentences on each run that bear on its results, by its name
     """
 
     case: str
     changes: tuple[str, ...]
-    statistics: StudyTable
-    supports: StudyTable
-    droppers: StudyTable
-    criteria: StudyTable
+    tables: dict[str, StudyTable]
     remarks: dict[str, list[str]]
 
 
@@ -118,10 +113,12 @@ def differences(changes: Sequence[str], ended: Sequence[Ended], out: Path) -> Di
         return Differences(
             str(a.attributes["case"]),
             tuple(changes),
-            _statistics(before.summary, after.summary),
-            _by_place("Uplift by support", "arm", *arms, of_arms),
-            _by_place("Droppers", "dropper", *droppers, of_droppers),
-            _criteria(before.summary, after.summary),
+            {
+                "statistics": _statistics(before.summary, after.summary),
+                "verdicts": _criteria(before.summary, after.summary),
+                "supports": _by_place("Uplift by support", "arm", *arms, of_arms),
+                "droppers": _by_place("Droppers", "dropper", *droppers, of_droppers),
+            },
             {one.variant.name: one.remarks for one in ended},
         )
 
@@ -217,23 +214,29 @@ def _criteria(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
 
 def as_text(found: Differences) -> str:
     """Statistics, verdicts that change, and what changes most of the line."""
-    lines = [f"{found.case} with {', '.join(found.changes)}", "", found.statistics.text(), ""]
-    rows = found.criteria.rows
+    lines = [
+        f"{found.case} with {', '.join(found.changes)}",
+        "",
+        found.tables["statistics"].text(),
+        "",
+    ]
+    rows = found.tables["verdicts"].rows
     turned = [row for row in rows if row["verdict_as_it_is"] != row["verdict_changed"]]
     lines += [
         f"{row['criterion']}: {row['verdict_as_it_is']} as it is, {row['verdict_changed']} with "
         "the change"
         for row in turned
     ] or ["No verdict changes."]
-    for table, name, what in (
-        (found.supports, "uplift_mm", "Uplift at {x:g} m: {a:.1f} -> {b:.1f} mm"),
-        (found.droppers, "max_N", "Largest force of the dropper at {x:g} m: {a:.1f} -> {b:.1f} N"),
+    for places, name, what in (
+        ("supports", "uplift_mm", "Uplift at {x:g} m: {a:.1f} -> {b:.1f} mm"),
+        ("droppers", "max_N", "Largest force of the dropper at {x:g} m: {a:.1f} -> {b:.1f} N"),
     ):
         key = f"{name}_{DIFFERENCE}"
-        places = [row for row in table.rows if row["evaluated"] and row[key] is not None]
+        of_table = found.tables[places].rows
+        changed = [row for row in of_table if row["evaluated"] and row[key] is not None]
         lines += [
             what.format(x=row["x_m"], a=row[f"{name}_{AS_IT_IS}"], b=row[f"{name}_{CHANGED}"])
-            for row in sorted(places, key=lambda row: -abs(row[key]))[:_MOST_CHANGED]
+            for row in sorted(changed, key=lambda row: -abs(row[key]))[:_MOST_CHANGED]
         ]
     named = [(WORDS[name], texts) for name, texts in found.remarks.items()]
     return "\n".join([*lines, *remark_lines(named)])
@@ -250,13 +253,8 @@ def write(folder: Path, found: Differences) -> list[Path]:
     return write_files(
         folder,
         {f"{name}.png": data for name, data in pictures.items()}
-        | {
-            "statistics.csv": found.statistics,
-            "supports.csv": found.supports,
-            "droppers.csv": found.droppers,
-            "verdicts.csv": found.criteria,
-            PAGE: page(title, lead, _sections(found), pictures),
-        },
+        | {f"{name}.csv": table for name, table in found.tables.items()}
+        | {PAGE: page(title, lead, _sections(found), pictures)},
     )
 
 
@@ -265,8 +263,8 @@ def _sections(found: Differences) -> Iterator[Section]:
         Picture(_FORCE, "Contact force, 20 Hz low-pass, along the track"),
         Picture(_UPLIFT, "Largest uplift at each steady arm"),
     ]
-    for table in (found.statistics, found.criteria, found.supports, found.droppers):
-        pictures = shown if table is found.statistics else []
+    for name, table in found.tables.items():
+        pictures = shown if name == "statistics" else []
         yield Section(table.title, [replace(table, title="")], pictures)
     remarks = [
         Text(text, "remark", f"{WORDS[name]}: ")

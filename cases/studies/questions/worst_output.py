@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import NamedTuple
 
 from catenary.base.errors import CatenaryError
 from catenary.cases.run.prepared import rest_of
@@ -12,23 +10,15 @@ from catenary.cases.scene.load import recorded_scene
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.study_table import StudyTable, file_table, write_files
+from catenary.postproc.report.study_table import Content, StudyTable, file_table
 
 NONE = "no cause found"
 _MOST_CAUSES = 4  # of a place in the text; tables have all
 
 
-class Answer(NamedTuple):
-    """The tables of spans, supports and droppers, whole, and a text about the worst of each."""
-
-    spans: StudyTable
-    supports: StudyTable
-    droppers: StudyTable
-    text: str
-
-
-def answer_of(results: Results, count: int) -> Answer:
-    """Find the worst places of a run and candidates for their causes. Not collective.
+def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:
+    """A text about the worst places of a run with candidates for their causes, and tables of all
+    places by names of files. Not collective.
 
     Parameters
     ----------
@@ -68,7 +58,8 @@ def answer_of(results: Results, count: int) -> Answer:
         ("x_m", "wire", "max_uplift_mm", "median_mm", "stands_out", "causes"),
         ((*arm[1:], causes.at(arm)) for arm in places.arms),
     )
-    return Answer(spans, supports, _droppers_table(places, causes), text)
+    tables = {"spans": spans, "supports": supports, "droppers": _droppers_table(places, causes)}
+    return text, {f"worst_{name}.csv": own for name, own in tables.items()}
 
 
 def _causes(results: Results, passages: Sequence[Passage]) -> tuple[Causes, str]:
@@ -146,9 +137,3 @@ def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
         cells.append((one.x, one.wire, *values, causes.at(one)))
     heads = ("x_m", "wire", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
     return file_table(heads, cells)
-
-
-def write(folder: Path, answer: Answer) -> list[Path]:
-    """Write the three tables; returns the files. Not collective."""
-    tables = {"spans": answer.spans, "supports": answer.supports, "droppers": answer.droppers}
-    return write_files(folder, {f"worst_{name}.csv": own for name, own in tables.items()})
