@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import Scene, find_case, read_draft
+from scenes import TINY, Scene, find_case, read_draft
 from verb_runner import invoke
 
 import catenary
@@ -34,17 +34,6 @@ from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.study import make_plan
 from catenary.cases.studies.tolerance.task import ToleranceTask
 
-# Six spans with one element a gap and pre-sag of each dropper.
-TINY: dict[str, Any] = {
-    "line.n_spans": 6,
-    "mesh.elements_per_gap": 1,
-    "train.start_m": 65.0,
-    "train.end_m": 257.0,
-    "train.raise_time_s": 0.2,
-    "numerics.dt_s": 0.005,
-    "evaluation.from_m": 120.0,
-    "evaluation.to_m": 240.0,
-}
 SAG = [0.0, 10.0, 20.0, 30.0, 35.0, 30.0, 20.0, 10.0, 0.0]
 FORWARD = {"directions": ["forward"]}
 HEAD = "pantographs.reference.masses_kg"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import Scene, line_of, read_draft
+from scenes import TINY, Scene, line_of, read_draft
 from verb_runner import invoke
 
 from catenary import InputError
@@ -35,18 +35,6 @@ from catenary.cases.studies.tolerance.study import (
 from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
-
-# Six spans with one element a gap.
-TINY: dict[str, Any] = {
-    "line.n_spans": 6,
-    "mesh.elements_per_gap": 1,
-    "train.start_m": 65.0,
-    "train.end_m": 257.0,
-    "train.raise_time_s": 0.2,
-    "numerics.dt_s": 0.005,
-    "evaluation.from_m": 120.0,
-    "evaluation.to_m": 240.0,
-}
 DROPPERS = {"name": "droppers", "kind": "dropper_lengths", "level": 5.0, "most": 20.0}
 SPEED = {"name": "speed", "kind": "key", "key": "train.speed_km_h", "level": 10.0, "most": 40.0}
 TENSION = {"name": "tension", "kind": "tension", "level": 2.0, "most": 10.0}
