@@ -320,7 +320,7 @@ def _row(
         dict(level.sizes),
         errors,
         percent,
-        cost=min(costs) / summary["simulated_s"],
+        cost=min(costs, default=math.nan) / summary["simulated_s"],
         timings=len(costs),
         estimate=max(known, default=math.nan),
         iterations=counted["rounds"] / counted["steps"],
