@@ -65,7 +65,7 @@ def highest_speeds(
     step : float
         Distance of the speeds marched first [km/h]. Narrower stretches may be missed.
     within : float
-        How closely ends of stretches are found [km/h].
+        How closely ends of stretches are found [km/h], at least 0.001.
     criteria : str or sequence of str
         Parts of names of criteria, all criteria if there are none.
     direction : str
