@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from catenary.cases.studies.waves.theory import WaveTheory
 
 TABLE, RECORD, PICTURE = "separation.csv", "separation.json", "separation.png"
-# Most distances of a study, and the bounds of a distance [m].
-MOST, _LEAST, _FARTHEST = 2000, 1.0, 1000.0
+# Most distances of a study, the bounds of a distance, and the least step between two [m].
+MOST, _LEAST, _FARTHEST, _CLOSEST = 2000, 1.0, 1000.0, 1e-3
 DISTANCE, PLACES = "separation_m", ("leading", "trailing")
 _UPLIFT = "max_uplift_mm"
 _OF_BOTH = (
@@ -82,8 +82,8 @@ class Distances(NamedTuple):
                 f"{_LEAST:g} to {_FARTHEST:g} m"
             )
         step = option("--step", "step")
-        if not 0.0 < self.step < inf:
-            raise InputError(f"{step} {self.step:g} is not possible: it is above 0 m")
+        if not _CLOSEST <= self.step < inf:
+            raise InputError(f"{step} {self.step:g} is not possible: it is at least {_CLOSEST:g} m")
         length = self.farthest - self.nearest
         if length / self.step > MOST:
             raise InputError(f"{step} {self.step:g} makes more than {MOST} distances")
@@ -169,7 +169,7 @@ def variant_of(scene: Scene, separation: float | None) -> Variant:
     ahead = [f"train.start_m={scene.train.start_m + separation:.10g}"]
     if scene.train.end_m is not None:  # of the leading one, too
         ahead.append(f"train.end_m={scene.train.end_m + separation:.10g}")
-    return Variant(f"{separation:g}m", (*ahead, f"train.pantographs={train}"))
+    return Variant(f"{separation:.8g}m", (*ahead, f"train.pantographs={train}"))
 
 
 def _row(separation: float | None, one: Ended) -> Row:
