@@ -428,6 +428,11 @@ def test_errors_that_cannot_be_are_refused(errors: list[dict[str, Any]], says: s
         make_plan(tiny(), task_of(*errors))
 
 
+def test_an_unknown_key_of_a_table_is_answered_with_the_keys_there() -> None:
+    with pytest.raises(InputError, match="samples.n in .* is unknown; it takes probability, conf"):
+        task_of(SPEED, samples={"n": 4})
+
+
 def test_the_verb_writes_what_it_says(
     tmp_path: Path, evaluated: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
