@@ -74,6 +74,22 @@ def test_verdicts_that_turn_are_told(folder: Path) -> None:
     assert "Uplift by support" in page and page.count("data:image/png") == 2
 
 
+def test_what_one_run_alone_has_is_told(tmp_path: Path) -> None:
+    """Figures and verdicts of a second pantograph, which hops behind the first one."""
+    pair = 'train.pantographs=[{name="reference"},{name="reference",behind_m=60}]'
+    said = invoke("what-if", CASE, "--short", "--set", pair, "-o", str(tmp_path)).output
+    fails = "standard deviation, 0.3 of the mean, trailing: no such criterion as it is, failed"
+    assert fails in said and "trailing: passed" not in said
+    found = {row["criterion"]: row for row in rows(tmp_path / "verdicts.csv")}
+    assert found["maximum contact force"]["verdict_changed"] == "no such criterion"
+    (row,) = [
+        row
+        for row in rows(tmp_path / "statistics.csv")
+        if row["of"] == "trailing" and row["statistic"] == "standard deviation, 0-20 Hz [N]"
+    ]
+    assert not row[AS_IT_IS] and not row["difference"] and float(row[CHANGED]) > 40.0
+
+
 def test_times_slack_are_counted_from_the_record(folder: Path) -> None:
     table = rows(folder / "droppers.csv")
     for name in (AS_IT_IS, CHANGED):

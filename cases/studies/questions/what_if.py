@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -42,6 +43,7 @@ PAGE = "what_if.html"
 _FORCE, _UPLIFT = "force", "uplift"
 _MOST_CHANGED = 3  # arms and droppers named on a terminal
 _VERDICTS = {None: "not judged", True: "passed", False: "failed"}
+_ABSENT = "no such criterion"  # such as of a second pantograph
 # Arms and droppers are the same ones in both runs where they stand so close [m].
 _SAME_PLACE = 1e-6
 
@@ -143,11 +145,12 @@ def _key(name: str, of: str) -> str:
 
 
 def _statistics(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
-    pairs = list(zip(statistics_of(before), statistics_of(after), strict=False))
-    of_all = [(own["pantograph"], own, other, OF_PANTOGRAPH) for own, other in pairs]
+    absent: dict[str, Any] = {}
+    pairs = list(zip_longest(statistics_of(before), statistics_of(after), fillvalue=absent))
+    of_all = [((own or other)["pantograph"], own, other, OF_PANTOGRAPH) for own, other in pairs]
     rows = [
         {"of": name, "statistic": column.meaning}
-        | _figures("", own[column.name], other[column.name])
+        | _figures("", own.get(column.name), other.get(column.name))
         for name, own, other, columns in [*of_all, ("line", *pairs[0], OF_LINE)]
         for column in columns
     ]
@@ -194,15 +197,15 @@ def _pairs(first: np.ndarray, second: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _criteria(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
-    second = {row["criterion"]: row for row in after["acceptance"]}
+    runs = [{row["criterion"]: row for row in one["acceptance"]} for one in (before, after)]
     rows, columns = [], [Column("criterion", "criterion")]
-    for row in before["acceptance"]:
-        if (other := second.get(row["criterion"])) is not None:
-            found = {"criterion": row["criterion"], "unit": row["unit"]}
-            for name, one in ((AS_IT_IS, row), (CHANGED, other)):
-                found |= {f"value_{name}": one["value"], f"limit_{name}": one["limit"]}
-                found[f"verdict_{name}"] = _VERDICTS[one["passed"]]
-            rows.append(found)
+    for criterion in dict.fromkeys([*runs[0], *runs[1]]):
+        row: dict[str, Any] = {"criterion": criterion}
+        for name, run in zip(WORDS, runs, strict=True):
+            own = run.get(criterion)
+            row[f"value_{name}"], row[f"limit_{name}"] = own and own["value"], own and own["limit"]
+            row[f"verdict_{name}"] = _VERDICTS[own["passed"]] if own else _ABSENT
+        rows.append(row | {"unit": runs[criterion not in runs[0]][criterion]["unit"]})
     for name, words in WORDS.items():
         columns += [
             Column(f"value_{name}", words, ".4g"),
@@ -221,11 +224,11 @@ def as_text(found: Differences) -> str:
         "",
     ]
     rows = found.tables["verdicts"].rows
-    turned = [row for row in rows if row["verdict_as_it_is"] != row["verdict_changed"]]
+    verdicts = [(row["criterion"], row["verdict_as_it_is"], row["verdict_changed"]) for row in rows]
     lines += [
-        f"{row['criterion']}: {row['verdict_as_it_is']} as it is, {row['verdict_changed']} with "
-        "the change"
-        for row in turned
+        f"{criterion}: {first} as it is, {second} with the change"
+        for criterion, first, second in verdicts
+        if first != second and (_ABSENT not in (first, second) or "failed" in (first, second))
     ] or ["No verdict changes."]
     for places, name, what in (
         ("supports", "uplift_mm", "Uplift at {x:g} m: {a:.1f} -> {b:.1f} mm"),
