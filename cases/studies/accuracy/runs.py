@@ -257,10 +257,10 @@ def run(
         round_of = f"no. {number} of {plan.repeats}"
         options.progress(f"again, for their time, {round_of}: {len(short)} short runs")
         short.reverse()  # whatever else the machine does now and then meets others
-        again = []
-        for job in short:
-            variant = Variant(f"{job.variant.name}__again_{number}", job.variant.assignments)
-            again.append(replace(job, variant=variant))
+        again = [
+            replace(job, variant=replace(job.variant, name=f"{job.variant.name}__again_{number}"))
+            for job in short
+        ]
         repeated = all_ended(run_jobs(again, folder, comm, alone))
         every += repeated
         for job, one in zip(short, repeated, strict=True):
