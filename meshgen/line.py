@@ -110,6 +110,15 @@ class Line(Spans):
         first = np.searchsorted(x, masts[span], side="right")
         return x[first : np.searchsorted(x, masts[span + 1])]
 
+    @property
+    def numbered_droppers(self) -> dict[tuple[int, int], float]:
+        """Places of the droppers of all spans [m], by the span and the number in it, from 1."""
+        return {
+            (span + 1, number): float(x)
+            for span in range(self.n_spans)
+            for number, x in enumerate(self.droppers_of_span(span), start=1)
+        }
+
     def running_spans(self, wire: Wire) -> list[int]:
         """Spans in which trains run on a wire, from support to support; they count from 0.
 

@@ -65,7 +65,7 @@ def highest_speeds(
     step : float
         Distance of the speeds marched first [km/h]. Narrower stretches may be missed.
     within : float
-        How closely ends of stretches are found [km/h].
+        How closely ends of stretches are found [km/h], at least 0.001.
     criteria : str or sequence of str
         Parts of names of criteria, all criteria if there are none.
     direction : str
@@ -134,7 +134,7 @@ def separations(
     scene : Scene, str, Path or mapping
         The scene, or whatever ``load`` takes for one; its own pantographs are replaced.
     nearest, farthest, step : float
-        Distances [m]: from ``nearest`` on, ``step`` apart, ``farthest`` at most.
+        Distances [m]: from ``nearest`` on, ``step`` apart, at least 0.001, ``farthest`` at most.
     out : str or Path, optional
         Folder into which all is written that ``catenary separation -o`` writes. Marches that were
         stopped go on there.

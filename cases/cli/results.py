@@ -141,17 +141,15 @@ def compare(
     """Serial."""
     from catenary.postproc.read.guard import examined
 
-    is_measured = others[0].suffix.lower() == ".csv"
-    if is_measured and len(others) == 1:
+    tables = [one for one in (first, *others) if one.suffix.lower() == ".csv" and not one.is_dir()]
+    if tables == others and len(others) == 1:
         _compare_measured(first, others[0], description, out, force)
         return
-    if is_measured or description is not None or out is not None:
+    if tables:
+        raise InputError("a measurement is compared with one run: name the run, then the CSV file")
+    if description is not None or out is not None:
         option = "--description" if description is not None else "-o"
-        raise InputError(
-            "a measurement is compared with one run: name a run and a CSV file"
-            if is_measured
-            else f"{option} belongs to a measurement: name a run and a CSV file"
-        )
+        raise InputError(f"{option} belongs to a measurement: name a run and a CSV file")
     from catenary.postproc.evaluate.compare import compare as compare_runs
 
     folders = [first, *others]

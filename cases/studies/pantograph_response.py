@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
-from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.run.describe.pantographs import description_of
 from catenary.cases.scene.problem import pantograph_of, static_force
 from catenary.cases.scene.scene import Scene
@@ -29,7 +27,13 @@ from catenary.postproc.report.pictures.figures import (
     own_style,
     tidy,
 )
-from catenary.postproc.report.study_table import StudyTable, texts_table, write_files
+from catenary.postproc.report.study_table import (
+    Content,
+    StudyTable,
+    file_table,
+    texts_table,
+    write_files,
+)
 
 # Frequencies for the search of peaks and for the fit.
 N_SEARCHED, N_FITTED = 400, 200
@@ -195,32 +199,19 @@ def fit_error(fit: ChainFit) -> str:
     return f"rms error {100 * fit.rms_error:.2g} %, largest {100 * fit.largest_error:.2g} %"
 
 
-HEADER = "frequency_hz,receptance_real_m_per_N,receptance_imag_m_per_N"
 FILES = ("receptance.csv", "receptance.png", "lumped.toml")
-
-
-def new_files(folder: Path, force: bool) -> None:
-    """Raise ``InputError`` unless the files can be written into ``folder``."""
-    refuse_impossible(folder)
-    there = [name for name in FILES if (folder / name).exists()]
-    if there and not force:
-        raise InputError(f"-o {folder} has {there[0]} already; give --force to replace it")
 
 
 def write_study(found: PantographStudy, folder: Path) -> list[Path]:
     """Write all files and return their paths. Raises ``RunBroken`` if the disk refuses."""
     table, drawn, lumped = FILES
-    texts = {table: csv_text(found), lumped: lumped_toml(found)}
-    return write_files(folder, {**texts, drawn: lambda: picture(found)})
-
-
-def csv_text(found: PantographStudy) -> str:
-    """The receptance at the head, upward per upward force, one frequency a line."""
-    rows = [
-        f"{frequency:.10g},{value.real:.10g},{value.imag:.10g}"
-        for frequency, value in zip(found.range.frequencies(), found.receptance, strict=True)
-    ]
-    return "\n".join([HEADER, *rows]) + "\n"
+    heads = ("frequency_hz", "receptance_real_m_per_N", "receptance_imag_m_per_N")
+    columns = found.range.frequencies(), found.receptance.real, found.receptance.imag
+    # The receptance at the head, upward per upward force.
+    rows = file_table(heads, np.column_stack(columns).tolist())
+    content: dict[str, Content] = {table: rows, lumped: lumped_toml(found)}
+    content[drawn] = lambda: picture(found)
+    return write_files(folder, content)
 
 
 @own_style()
@@ -262,7 +253,7 @@ def lumped_toml(found: PantographStudy) -> str:
         f"{found.speed:g} km/h)",
         f"# from {fit.lowest:g} to {fit.highest:g} Hz at {fit.n_points} frequencies: "
         f"{fit_error(fit)}",
-        f"[pantographs.{_key(f'{kind}_lumped')}]",
+        f"[pantographs.{json.dumps(f'{kind}_lumped', ensure_ascii=False)}]",
         *_keys_of(found),
     ]
     return "\n".join(lines) + "\n"
@@ -274,25 +265,15 @@ def inline_table(found: PantographStudy) -> str:
 
 
 def _keys_of(found: PantographStudy) -> list[str]:
-    """The fitted model as keys with values."""
+    """The fitted model as keys with values, which TOML writes as JSON does."""
     data = found.fit.data
-    keys = [
-        'type = "lumped"',
-        f"masses_kg = {_list(data.masses)}",
-        f"stiffnesses_N_per_m = {_list(data.stiffnesses)}",
-        f"dampings_N_s_per_m = {_list(data.dampings)}",
-        f"static_force_N = {found.static_force:.6g}",
-    ]
+    figures = data.masses, data.stiffnesses, data.dampings, (found.static_force,)
+    masses, stiffnesses, dampings, (force,) = (
+        [float(f"{value:.6g}") for value in values] for values in figures
+    )
+    table: dict[str, Any] = {"type": "lumped", "masses_kg": masses}
+    table |= {"stiffnesses_N_per_m": stiffnesses, "dampings_N_s_per_m": dampings}
+    table["static_force_N"] = force
     if found.nominal_height is not None:
-        keys.append(f"nominal_height_m = {found.nominal_height!r}")
-    return keys
-
-
-def _key(name: str) -> str:
-    """A name as TOML has it in a key."""
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
-
-
-def _list(values: tuple[float, ...]) -> str:
-    # A float of TOML has a point or an exponent, and takes an integer for one as well.
-    return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"
+        table["nominal_height_m"] = found.nominal_height
+    return [f"{key} = {json.dumps(value)}" for key, value in table.items()]

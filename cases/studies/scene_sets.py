@@ -22,7 +22,7 @@ from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import FORWARD, turned
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.sweep.jobs import OF_PANTOGRAPH, STATISTICS
+from catenary.cases.studies.sweep.jobs import OF_LINE, STATISTICS, statistics_of
 
 if TYPE_CHECKING:
     from catenary.cases.studies.ensemble import Marches
@@ -232,14 +232,6 @@ class SceneSet:
 BROKE = "broke"
 # Tables of a scene that its figures do not depend on.
 _IDLE = ("case", "output", "test")
-OF_EACH_PANTOGRAPH = tuple(column.name for column in OF_PANTOGRAPH)
-# Statistics of the line: table and key in a summary.
-_OF_LINE = {
-    "max_uplift_mm": ("supports", "max_uplift_mm"),
-    "n_slackened": ("droppers", "n_slackened"),
-    "max_dropper_force_N": ("droppers", "max_force_N"),
-    "min_dropper_force_N": ("droppers", "min_force_N"),
-}
 
 
 def evaluate(scenes: Sequence[Scene], pool: Pool[Any] | None = None) -> list[dict[str, Any]]:
@@ -318,11 +310,9 @@ def values_of(summary: Mapping[str, Any], statistic: str) -> list[float] | None:
     """
     if BROKE in summary:
         return None
-    if statistic in OF_EACH_PANTOGRAPH:
-        found = [one.get(statistic) for one in summary["pantographs"]]
-    else:
-        table, key = _OF_LINE[statistic]
-        found = [summary[table].get(key)]
+    found = [row[statistic] for row in statistics_of(summary)]
+    if STATISTICS[statistic] in OF_LINE:
+        found = found[:1]
     return None if None in found else [float(value) for value in found]
 
 

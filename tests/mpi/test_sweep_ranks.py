@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from mpi4py import MPI
+from scenes import TINY_WORDS
 
 from catenary import InputError, RunBroken
 from catenary.cases.process.workers import each
@@ -19,18 +20,6 @@ from catenary.cases.studies.sweep.variants import Variant
 
 COMM = MPI.COMM_WORLD
 CASE = "en50318_2002"
-TINY = (
-    "line.n_spans=6",
-    "mesh.elements_per_gap=1",
-    "train.start_m=65",
-    "train.end_m=257",
-    "train.raise_time_s=0.2",
-    "numerics.dt_s=0.005",
-    "evaluation.from_m=120",
-    "evaluation.to_m=240",
-    "output.field_every_s=0",
-    "output.energy_every_s=0",
-)
 # Pushes on its droppers at rest, which is found on rank 0 alone.
 VARIANTS = (
     Variant("slack", ("line.dropper.pre_sag_mid_mm=-100",)),
@@ -49,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 def test_a_sweep_goes_past_a_broken_variant_on_all_ranks(folder: Path) -> None:
-    jobs = make_jobs(CASE, VARIANTS, TINY)
+    jobs = make_jobs(CASE, VARIANTS, TINY_WORDS)
     slack, sound = run_jobs(jobs, folder, COMM)
     assert "would be slack at rest" in slack.outcome
     assert sound.done
@@ -65,9 +54,9 @@ def test_a_sweep_goes_past_a_broken_variant_on_all_ranks(folder: Path) -> None:
 
 
 def test_a_refusal_reaches_all_ranks(folder: Path) -> None:
-    jobs = make_jobs(CASE, VARIANTS[1:], TINY)
+    jobs = make_jobs(CASE, VARIANTS[1:], TINY_WORDS)
     run_jobs(jobs, folder, COMM)
-    other = make_jobs(CASE, VARIANTS[1:], [*TINY, "contact.stiffness_N_per_m=2e4"])
+    other = make_jobs(CASE, VARIANTS[1:], [*TINY_WORDS, "contact.stiffness_N_per_m=2e4"])
     with pytest.raises(InputError, match="another configuration"):
         run_jobs(other, folder, COMM)
 
@@ -75,7 +64,9 @@ def test_a_refusal_reaches_all_ranks(folder: Path) -> None:
 def test_each_rank_makes_runs_of_its_own(folder: Path) -> None:
     """With -j of as many ranks: the same figures as one after the other, to the last bit."""
     speeds = [f"train.speed_km_h={speed}" for speed in (200, 220, 240, 260)]
-    jobs = make_jobs(CASE, [Variant(f"v{i}", (speed,)) for i, speed in enumerate(speeds)], TINY)
+    jobs = make_jobs(
+        CASE, [Variant(f"v{i}", (speed,)) for i, speed in enumerate(speeds)], TINY_WORDS
+    )
     lines: list[str] = []
     options = RunOptions(progress=lines.append, n_jobs=COMM.size)
     ended = run_jobs(jobs[:3], folder, COMM, options)
@@ -103,6 +94,6 @@ def test_an_error_on_a_rank_reaches_all_when_the_others_are_done(folder: Path) -
 
 @pytest.mark.skipif(COMM.size == 1, reason="for several ranks")
 def test_as_many_runs_at_a_time_as_there_are_ranks_or_one(folder: Path) -> None:
-    jobs = make_jobs(CASE, VARIANTS[1:], TINY)
+    jobs = make_jobs(CASE, VARIANTS[1:], TINY_WORDS)
     with pytest.raises(InputError, match=f"jobs is {COMM.size + 1} on {COMM.size} ranks"):
         run_jobs(jobs, folder, COMM, RunOptions(n_jobs=COMM.size + 1))

@@ -10,25 +10,13 @@ from typing import Any
 
 import pytest
 import verb_runner
+from scenes import TINY, TINY_WORDS
 
 import catenary
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
 CASE = "en50318_2002"
-# Six spans with one element a gap, run through in 460 steps.
-TINY = (
-    "line.n_spans=6",
-    "mesh.elements_per_gap=1",
-    "train.start_m=65",
-    "train.end_m=257",
-    "train.raise_time_s=0.2",
-    "numerics.dt_s=0.005",
-    "evaluation.from_m=120",
-    "evaluation.to_m=240",
-    "output.field_every_s=0",
-    "output.energy_every_s=0",
-)
 SAMPLE = """
 n = 6
 seed = 3
@@ -65,7 +53,7 @@ def swept(file: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, s
     """The folder of a sweep of six samples and what the command line said."""
     out = tmp_path_factory.mktemp("swept") / "out"
     hook = sys.excepthook
-    done = invoke("sweep", CASE, "-o", out, "--sample", file, "--set", *TINY)
+    done = invoke("sweep", CASE, "-o", out, "--sample", file, "--set", *TINY_WORDS)
     sys.excepthook = hook
     assert done.exit_code == 0, done.output
     return out, done.stdout
@@ -102,7 +90,7 @@ def test_a_sample_runs_alone_by_its_own_assignments(
     record = json.loads((out / "sweep.json").read_text())
     assignments = record["variants"][4]["assignments"]
     assert len(assignments) == 3
-    done = invoke("run", CASE, "-o", tmp_path / "alone", "--set", *TINY, *assignments)
+    done = invoke("run", CASE, "-o", tmp_path / "alone", "--set", *TINY_WORDS, *assignments)
     assert done.exit_code == 0, done.output
     summary = json.loads((tmp_path / "alone" / "summary.json").read_text())
     row = record["rows"][4]
@@ -117,11 +105,11 @@ def test_the_same_command_continues_and_more_samples_join(
     more = tmp_path / "more.toml"
     more.write_text(SAMPLE.replace("n = 6", "n = 7"))
     before = rows_of(out)
-    done = invoke("sweep", CASE, "-o", out, "--sample", more, "--set", *TINY)
+    done = invoke("sweep", CASE, "-o", out, "--sample", more, "--set", *TINY_WORDS)
     assert done.exit_code == 0, done.output
     assert done.stdout.count("done already") == 6
     assert rows_of(out)[:6] == before and len(rows_of(out)) == 7
-    again = invoke("sweep", CASE, "-o", out, "--sample", file, "--set", *TINY)
+    again = invoke("sweep", CASE, "-o", out, "--sample", file, "--set", *TINY_WORDS)
     assert again.exit_code == 2
     assert "a sweep with other variants (sample_000007)" in again.stderr
 
@@ -133,7 +121,16 @@ def test_parts_of_two_machines_merge_into_the_same_table(
     parts = [tmp_path / "one", tmp_path / "two"]
     for number, folder in enumerate(parts, start=1):
         done = invoke(
-            "sweep", CASE, "-o", folder, "--sample", file, "--part", f"{number}/2", "--set", *TINY
+            "sweep",
+            CASE,
+            "-o",
+            folder,
+            "--sample",
+            file,
+            "--part",
+            f"{number}/2",
+            "--set",
+            *TINY_WORDS,
         )
         assert done.exit_code == 0, done.output
     parts = [folder / f"part_{number}_of_2" for number, folder in enumerate(parts, start=1)]
@@ -163,9 +160,7 @@ def test_a_table_is_evaluated_again(swept: tuple[Path, str], tmp_path: Path) -> 
 
 
 def test_python_samples_and_evaluates_too(file: Path) -> None:
-    changes = {key: float(value) for key, _, value in (one.partition("=") for one in TINY)}
-    changes |= {key: int(changes[key]) for key in ("line.n_spans", "mesh.elements_per_gap")}
-    scene = catenary.load(CASE).replace(changes)
+    scene = catenary.load(CASE).replace(TINY)
     table = catenary.sweep(scene, sample=file)
     found = catenary.uncertainty(table, sample=file)
     assert len(table) == 6 and set(found.statistics["n"]) == {6}

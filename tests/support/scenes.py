@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import catenary
 from catenary.cases.run.scene_mesh import mesh_of
@@ -19,6 +20,8 @@ from catenary.cases.scene.scene import Scene
 from catenary.scenes import Scene as SceneOfUsers
 
 __all__ = [
+    "TINY",
+    "TINY_WORDS",
     "Scene",
     "find_case",
     "line_data_of",
@@ -33,6 +36,24 @@ __all__ = [
     "shipped",
     "with_words",
 ]
+
+# The reference model of EN 50318 with six spans and one element a gap, run through in 460 steps.
+TINY: dict[str, Any] = {
+    "line.n_spans": 6,
+    "mesh.elements_per_gap": 1,
+    "train.start_m": 65.0,
+    "train.end_m": 257.0,
+    "train.raise_time_s": 0.2,
+    "numerics.dt_s": 0.005,
+    "evaluation.from_m": 120.0,
+    "evaluation.to_m": 240.0,
+}
+# The same as words, with nothing but channels recorded.
+TINY_WORDS = (
+    *(f"{key}={value}" for key, value in TINY.items()),
+    "output.field_every_s=0",
+    "output.energy_every_s=0",
+)
 
 
 def with_words(case: str | Path, words: Sequence[str] = (), short: bool = False) -> catenary.Scene:

@@ -31,6 +31,7 @@ FIGURES = {
     "std_5_20_N": 22.0,
     "max_N": 200.0,
     "min_N": 40.0,
+    "max_uplift_mm": 55.0,
 }
 PLACES = np.linspace(0.0, 6.0 * np.pi, 3001)
 
@@ -39,7 +40,7 @@ def found(change: float = 0.0, **figures: float) -> Found:
     """Two pantographs; ``change`` of the second one's history is a cosine of that amplitude."""
     first = {**FIGURES, **figures}
     histories = [np.sin(PLACES), np.sin(PLACES) + change * np.cos(PLACES)]
-    return Found([first, dict(FIGURES)], 55.0, histories)
+    return Found([first, dict(FIGURES)], histories)
 
 
 def row(dt: float, h: float, percent: float, cost: float, outcome: str = "done") -> Row:
@@ -65,7 +66,7 @@ def test_errors_are_those_of_the_worse_pantograph() -> None:
 
 
 def test_what_a_run_does_not_have_is_left_out() -> None:
-    empty = Found([dict.fromkeys(FIGURES, None)] * 2, None, [np.zeros(0)] * 2)
+    empty = Found([dict.fromkeys(FIGURES, None)] * 2, [np.zeros(0)] * 2)
     assert compare(empty, found()) == ({}, {})
 
 
@@ -112,7 +113,7 @@ def modelled(dt: float, n: int) -> Found:
     """
     wrong = 4e5 * dt**2 - 60.0 / n**2
     history = math.sqrt(2.0) * (30.0 * np.sin(PLACES) + wrong * np.cos(PLACES))
-    return Found([{**FIGURES, "std_N": 30.0 + wrong}], 55.0, [history])
+    return Found([{**FIGURES, "std_N": 30.0 + wrong}], [history])
 
 
 def modelled_row(dt: float, n: int, reference: tuple[float, int]) -> Row:

@@ -108,3 +108,9 @@ def test_the_least_time_is_told() -> None:
     assert [each.timings for each in found.rows] == [3, 3]
     assert [each.remarks for each in found.rows] == [["of 1_elements"], ["of 5_elements"]]
     assert found.remarks[REFERENCE] == [f"of {REFERENCE}"]
+    # Several runs at a time are timed again, one by one; of one that breaks then nothing is known.
+    lost = runs.evaluate(
+        Plan("a_case", [one], [], 3), [ended(n) for n in names], times | {"1_elements": []}, 1.0
+    )
+    assert [each.timings for each in lost.rows] == [0, 3]
+    assert output.table_of(lost.rows).records()[0]["march_s_per_s"] is None

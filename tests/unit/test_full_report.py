@@ -142,7 +142,7 @@ def test_the_paper_form_has_pages_and_text(folder: Path) -> None:
         assert float(page.mediabox.height) == pytest.approx(841.9, abs=0.5)
     text = " ".join(" ".join(page.extract_text().split()) for page in paper.pages)
     assert "Acceptance" in paper.pages[0].extract_text()
-    for words in ("The run's own checks", "Worst span:", "Data sheet of the line", "signature"):
+    for words in ("The run's own checks", "Worst span by", "Data sheet of the line", "signature"):
         assert words in text
     assert f"1 / {len(paper.pages)}" in text
     # Pictures are vector graphics: their texts are texts of the page.
@@ -172,7 +172,7 @@ def test_a_rail_has_neither_droppers_nor_a_view_from_above(tmp_path: Path) -> No
     assert 'id="line"' in page and 'id="above"' not in page
     assert "There is no picture:" in page  # of waves, without snapshots
     words = words_of(page)
-    assert "Worst span:" in words and "Worst dropper:" not in words
+    assert "Worst span by" in words and "Worst dropper by" not in words
     assert "droppers that slackened" not in words and "Evaluated droppers" not in words
     # Nothing is told of what the rail has not: effects that are off, rods of its arms, pre-sag.
     effects = words.split("What was simulated")[-1].split("What was not simulated")[0]

@@ -113,6 +113,15 @@ def test_ends_of_stretches_are_bisected(monkeypatch: pytest.MonkeyPatch) -> None
     assert len(marched) == len(set(marched)) == 17 + 4 * 5
 
 
+def test_close_speeds_are_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of one criterion, as finely as speeds are bisected at all."""
+    holds = {"ends": lambda v: v < 200.0123}
+    found, marched = searched(monkeypatch, Speeds(200, 200.1, 0.1, 0.001), holds)
+    assert len(marched) == len(set(marched))
+    text = "The one criterion judged here holds from 200.0000 to 200.0117 km/h; at 200.0125 km/h"
+    assert text in as_text(found)
+
+
 def test_all_criteria_hold_where_each_does(monkeypatch: pytest.MonkeyPatch) -> None:
     holds = {"first": lambda v: v < 300.0, "second": lambda v: 210.0 <= v <= 330.0}
     found, _ = searched(monkeypatch, Speeds(200, 360, 10, 1), holds)
@@ -134,7 +143,7 @@ def test_a_speed_that_cannot_be_run_ends_a_stretch(monkeypatch: pytest.MonkeyPat
     whole = found.holds[0]
     assert 310 <= whole.stretches[0].fastest <= 311 < (whole.stretches[0].fails_at or 0)
     assert whole.stopped_by == ("is too fast",) and whole.fails_by is None
-    assert "to 360 km/h could not be made and count as failed; the first: is too fast" in as_text(
+    assert "to 360 km/h could not be made and counted as failed; the first: is too fast" in as_text(
         found
     )
 
@@ -187,6 +196,7 @@ def test_a_line_without_mirror_image_is_judged_one_way(monkeypatch: pytest.Monke
         (["--from", "300", "--to", "200"], "is no range of speeds"),
         (["--to", "2000"], "is no range of speeds"),
         (["--step", "1", "--within", "2"], "at most --step"),
+        (["--within", "1e-5"], "at least 0.001 km/h"),
         (["--step", "0.01", "--within", "0.01"], "at most 2000"),
         (["--from", "nan"], "is no range of speeds"),
     ],

@@ -468,5 +468,8 @@ def test_what_belongs_to_a_measurement_is_refused_of_runs(run: Path, tmp_path: P
     (tmp_path / "m.csv").write_text("a,b\n1,2\n", encoding="utf-8")
     done = invoke(str(run), str(tmp_path / "m.csv"))
     assert done.exit_code == 2 and "describe its columns with --description" in done.output
-    done = invoke(str(run), str(tmp_path / "m.csv"), str(run))
-    assert done.exit_code == 2 and "name a run and a CSV file" in done.output
+    table = str(tmp_path / "m.csv")
+    # The last two were read as results, and called damaged.
+    for words in ((str(run), table, str(run)), (table, str(run)), (str(run), str(run), table)):
+        done = invoke(*words)
+        assert done.exit_code == 2 and "name the run, then the CSV file" in done.output

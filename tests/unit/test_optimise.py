@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import Scene, find_case, read_draft
+from scenes import TINY, Scene, find_case, read_draft
 from verb_runner import invoke
 
 import catenary
@@ -34,17 +34,6 @@ from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.study import make_plan
 from catenary.cases.studies.tolerance.task import ToleranceTask
 
-# Six spans with one element a gap and pre-sag of each dropper.
-TINY: dict[str, Any] = {
-    "line.n_spans": 6,
-    "mesh.elements_per_gap": 1,
-    "train.start_m": 65.0,
-    "train.end_m": 257.0,
-    "train.raise_time_s": 0.2,
-    "numerics.dt_s": 0.005,
-    "evaluation.from_m": 120.0,
-    "evaluation.to_m": 240.0,
-}
 SAG = [0.0, 10.0, 20.0, 30.0, 35.0, 30.0, 20.0, 10.0, 0.0]
 FORWARD = {"directions": ["forward"]}
 HEAD = "pantographs.reference.masses_kg"
@@ -283,7 +272,7 @@ def test_a_short_search_is_checked_on_the_whole_stretch() -> None:
     (warning, _) = plan.warnings
     assert "shortened by its [test] table" in warning
     searched, checked = (
-        scenes.scene(scenes.members[0]) for scenes in (plan.scenes, plan.checks[0].scenes)
+        scenes.scene(scenes.members[0]) for scenes in (plan.scenes, plan.checks["as it is"])
     )
     whole, short = (one.scene().evaluation for one in (case, read_draft("ac_simple").shortened()))
     assert (searched.evaluation, checked.evaluation) == (short, whole) and short != whole
@@ -490,7 +479,7 @@ def test_a_search_may_be_coarser_than_its_checks() -> None:
     plan = study.make_plan(sagging(), task)
     member = plan.scenes.members[0]
     assert plan.scenes.scene(member).numerics.dt_s == 0.01
-    assert {own.scenes.scene(member).numerics.dt_s for own in plan.checks} == {0.005, 0.0025}
+    assert {own.scene(member).numerics.dt_s for own in plan.checks.values()} == {0.005, 0.0025}
     assert "numerics.dt_s=0.01" in plan.warnings[0]
     # 0.1 mm might be 0.1 m in the file of a case; a search means it.
     plan.scenes.scene(member, {"line.dropper.pre_sag_mm": [0.1, *SAG[1:]]})

@@ -245,7 +245,13 @@ def stretch(force: str) -> str:
         (
             "of,quantity,value\nline,max_uplift_mm,70\nline,max_uplift_mm,71\n",
             ONE,
-            "more than once",
+            "gives max_uplift_mm of line for ac_simple_275_one, which was given before",
+        ),
+        ("of,quantity,value\n", ONE, "has no rows: it gives no statistics"),
+        (
+            f"configuration,of,quantity,value\n{TWO},line,max_uplift_mm,70\n",
+            ONE,
+            f"has statistics of {TWO}, and --of names {ONE}: leave --of away",
         ),
         ("of,quantity,value\nline,uplift,2\n", ONE, 'has "uplift" of "line"'),
         ("of,quantity,value\nroof,std_N,2\n", ONE, "has figures of pantograph, line"),
@@ -259,6 +265,12 @@ def test_what_cannot_be_judged_is_one_sentence(
     path.write_text(content)
     with pytest.raises(InputError, match=sentence.replace("(", r"\(")):
         read_results([path], of, is_filtered=True)
+
+
+def test_forces_that_are_given_twice_are_refused() -> None:
+    """The second file took the place of the first, and nothing said so."""
+    with pytest.raises(InputError, match="gives mean_N of pantograph for .*, which was given befo"):
+        read_results([DATA / f"{ONE}.csv"] * 2, ONE, is_filtered=True)
 
 
 def test_limits_have_clauses_and_marks() -> None:

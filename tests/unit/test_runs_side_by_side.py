@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from measuring import COMM
 from program import catenary_started, python, started
+from scenes import TINY_WORDS
 from verb_runner import invoke
 from work_items import die_at_275, measure_steps
 
@@ -26,19 +27,8 @@ from catenary.cases.terminal.runs_bar import RunsBar
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
 CASE = "en50318_2002"
-# Six spans with one element a gap, run through in 2300 steps.
-TINY = (
-    "line.n_spans=6",
-    "mesh.elements_per_gap=1",
-    "train.start_m=65",
-    "train.end_m=257",
-    "train.raise_time_s=0.2",
-    "numerics.dt_s=0.001",
-    "evaluation.from_m=120",
-    "evaluation.to_m=240",
-    "output.field_every_s=0",
-    "output.energy_every_s=0",
-)
+# Run through in 2300 steps.
+TINY = (*TINY_WORDS, "numerics.dt_s=0.001")
 
 
 def figures(out: Path) -> list[dict[str, str]]:

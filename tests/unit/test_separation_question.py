@@ -40,15 +40,22 @@ def test_distances_are_even_and_end_in_the_range() -> None:
     [
         (["--from", "50", "--to", "40"], "is no range of distances"),
         (["--to", "1500"], "is no range of distances"),
-        (["--step", "0"], "above 0 m"),
+        (["--step", "0"], "at least 0.001 m"),
+        (["--from", "100", "--to", "100.001", "--step", "0.0005"], "at least 0.001 m"),
         (["--step", "0.01"], "more than 2000"),
         (["--from", "nan"], "is no range of distances"),
-        (["--step", "nan"], "above 0 m"),
+        (["--step", "nan"], "at least 0.001 m"),
     ],
 )
 def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
     done = invoke("separation", CASE, *words)
     assert done.exit_code == 2 and told in done.output
+
+
+def test_each_distance_has_a_run_of_its_own() -> None:
+    """Runs are kept by their names, which six digits do not tell apart here."""
+    scene, distances = load_scene(CASE), Distances(100.0005, 100.0105, 0.001).values()
+    assert len({variant_of(scene, one).name for one in distances}) == len(distances) == 11
 
 
 def test_the_train_ends_as_much_later_as_it_is_longer() -> None:

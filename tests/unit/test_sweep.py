@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 from measuring import COMM
-from scenes import with_words
+from scenes import TINY_WORDS, with_words
 from verb_runner import invoke
 
 import catenary
@@ -33,26 +33,13 @@ from catenary.postproc.read.results import Results
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
 CASE = "en50318_2002"
-# Six spans with one element a gap, run through in 460 steps.
-TINY = (
-    "line.n_spans=6",
-    "mesh.elements_per_gap=1",
-    "train.start_m=65",
-    "train.end_m=257",
-    "train.raise_time_s=0.2",
-    "numerics.dt_s=0.005",
-    "evaluation.from_m=120",
-    "evaluation.to_m=240",
-    "output.field_every_s=0",
-    "output.energy_every_s=0",
-)
 VARIED = "train.speed_km_h=250,300"
 # A wire that is to rise towards mid-span pushes on its droppers: found at the equilibrium.
 SLACK = "line.dropper.pre_sag_mid_mm=-100"
 
 
 def tiny(*variants: Variant) -> list[Job]:
-    return make_jobs(CASE, variants or product([parse_vary(VARIED)], {}), TINY)
+    return make_jobs(CASE, variants or product([parse_vary(VARIED)], {}), TINY_WORDS)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +47,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """The folder of a sweep of two speeds and what the command line said."""
     out = tmp_path_factory.mktemp("swept") / "out"
     hook = sys.excepthook
-    done = invoke("sweep", CASE, "-o", str(out), "--vary", VARIED, "--set", *TINY)
+    done = invoke("sweep", CASE, "-o", str(out), "--vary", VARIED, "--set", *TINY_WORDS)
     sys.excepthook = hook
     assert done.exit_code == 0, done.output
     return out, done.stdout
@@ -75,7 +62,8 @@ def test_each_variant_has_its_run_and_a_row(swept: tuple[Path, str]) -> None:
     assert [row["train.speed_km_h"] for row in table] == ["250", "300"]
     for row in table:
         summary = json.loads((out / row["variant"] / "summary.json").read_text())
-        assert float(row["std_N"]) == pytest.approx(summary["pantographs"][0]["std_N"], rel=1e-5)
+        for name in ("mean_N", "std_N"):
+            assert float(row[name]) == summary["pantographs"][0][name] and len(row[name]) > 12
         assert summary["speed_km_h"] == pytest.approx(float(row["train.speed_km_h"]))
         assert not (out / row["variant"] / "report.html").exists()
         assert f"{summary['pantographs'][0]['std_N']:.1f}" in said
@@ -89,7 +77,7 @@ def test_each_variant_has_its_run_and_a_row(swept: tuple[Path, str]) -> None:
 
 def test_a_variant_is_the_run_of_the_same_scene(swept: tuple[Path, str]) -> None:
     variant = tiny()[1].variant
-    alone = catenary.run(with_words(CASE, (*TINY, *variant.assignments)))
+    alone = catenary.run(with_words(CASE, (*TINY_WORDS, *variant.assignments)))
     with catenary.open(swept[0] / variant.name) as one:
         assert (alone.force == one.force).all()
 
@@ -132,7 +120,7 @@ def test_what_is_done_is_not_run_again(swept: tuple[Path, str]) -> None:
     before = (first / "run.h5").stat().st_mtime_ns
     figures = (out / "sweep.csv").read_text().splitlines()[2].split(",")[4:-1]
     (second / "variant.json").unlink()  # as a kill leaves it
-    again = invoke("sweep", CASE, "-o", str(out), "--vary", VARIED, "--set", *TINY)
+    again = invoke("sweep", CASE, "-o", str(out), "--vary", VARIED, "--set", *TINY_WORDS)
     assert again.exit_code == 0, again.output
     assert "[1/2] speed_km_h_250: done already" in again.stdout
     assert "[2/2] speed_km_h_300\n" in again.stdout
@@ -143,7 +131,7 @@ def test_what_is_done_is_not_run_again(swept: tuple[Path, str]) -> None:
 def test_further_values_join_a_sweep_and_other_ones_are_refused(swept: tuple[Path, str]) -> None:
     out, _ = swept
     other = invoke(
-        "sweep", CASE, "-o", str(out), "--vary", "train.speed_km_h=275", "--set", *TINY
+        "sweep", CASE, "-o", str(out), "--vary", "train.speed_km_h=275", "--set", *TINY_WORDS
     )  # fmt: skip
     assert other.exit_code == 2
     assert "a sweep with other variants (speed_km_h_250)" in other.stderr
@@ -154,7 +142,7 @@ def test_another_configuration_is_not_overwritten_without_force(tmp_path: Path) 
     variant = Variant("one", ())
     run_jobs(tiny(variant), tmp_path, COMM)
     before = (tmp_path / "one" / "summary.json").read_text()
-    changed = make_jobs(CASE, [variant], [*TINY, "contact.stiffness_N_per_m=2e4"])
+    changed = make_jobs(CASE, [variant], [*TINY_WORDS, "contact.stiffness_N_per_m=2e4"])
     with pytest.raises(InputError, match="another configuration"):
         run_jobs(changed, tmp_path, COMM)
     assert (tmp_path / "one" / "summary.json").read_text() == before
@@ -164,7 +152,7 @@ def test_another_configuration_is_not_overwritten_without_force(tmp_path: Path) 
 
 
 def test_a_run_of_its_own_is_not_overwritten(tmp_path: Path) -> None:
-    (other,) = make_jobs(CASE, [Variant("one", ())], [*TINY, "numerics.dt_s=0.01"])
+    (other,) = make_jobs(CASE, [Variant("one", ())], [*TINY_WORDS, "numerics.dt_s=0.01"])
     run_case(other.scene, tmp_path / "one", COMM, only_summary=True)
     with pytest.raises(InputError, match="the results of another run"):
         run_jobs(tiny(Variant("one", ())), tmp_path, COMM)
@@ -176,7 +164,7 @@ def test_a_variant_that_breaks_does_not_stop_the_others(tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = invoke(
         "sweep", CASE, "-o", str(out), "--variants", str(named),
-        "--set", *TINY,
+        "--set", *TINY_WORDS,
     )  # fmt: skip
     assert done.exit_code == 1, done.output
     assert "1 of 2 variants broke: slack (the dropper in span" in done.stderr
@@ -190,7 +178,7 @@ def test_a_variant_that_breaks_does_not_stop_the_others(tmp_path: Path) -> None:
 def test_a_sweep_whose_variants_all_break_still_has_its_table(tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = invoke(
-        "sweep", CASE, "-o", str(out), "--vary", SLACK.replace("=", "=-90,"), "--set", *TINY
+        "sweep", CASE, "-o", str(out), "--vary", SLACK.replace("=", "=-90,"), "--set", *TINY_WORDS
     )  # fmt: skip
     assert done.exit_code == 1
     assert "2 of 2 variants broke" in done.stderr
@@ -248,7 +236,7 @@ def test_bad_input_is_one_sentence_and_writes_nothing(
 
 def test_a_variant_that_is_refused_breaks_alone(tmp_path: Path) -> None:
     vary = "line.dropper.pre_sag_mid_mm=20,0.04,30"
-    words = ["sweep", CASE, "-o", str(tmp_path / "out"), "--vary", vary, "--set", *TINY]
+    words = ["sweep", CASE, "-o", str(tmp_path / "out"), "--vary", vary, "--set", *TINY_WORDS]
     done = invoke(*words)
     assert done.exit_code == 1, done.output
     why = "is it 0.04 m? write 40, or case.accept_unusual = true if it is meant"
@@ -260,18 +248,6 @@ def test_a_variant_that_is_refused_breaks_alone(tmp_path: Path) -> None:
     assert why in table[1]["outcome"] and table[1]["std_N"] == ""
     meant = invoke(*words, "case.accept_unusual=true", "--force")
     assert meant.exit_code == 0, meant.output
-
-
-def test_the_table_has_all_digits(swept: tuple[Path, str]) -> None:
-    folder, _ = swept
-    with (folder / "sweep.csv").open(encoding="utf-8") as file:
-        table = list(csv.DictReader(file))
-    for row in table:
-        path = folder / row["variant"] / "summary.json"
-        (found,) = json.loads(path.read_text(encoding="utf-8"))["pantographs"]
-        for name in ("mean_N", "std_N"):
-            assert float(row[name]) == found[name]
-            assert len(row[name]) > 12
 
 
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_run(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import Scene, line_of, read_draft
+from scenes import TINY, Scene, line_of, read_draft
 from verb_runner import invoke
 
 from catenary import InputError
@@ -35,18 +35,6 @@ from catenary.cases.studies.tolerance.study import (
 from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
-
-# Six spans with one element a gap.
-TINY: dict[str, Any] = {
-    "line.n_spans": 6,
-    "mesh.elements_per_gap": 1,
-    "train.start_m": 65.0,
-    "train.end_m": 257.0,
-    "train.raise_time_s": 0.2,
-    "numerics.dt_s": 0.005,
-    "evaluation.from_m": 120.0,
-    "evaluation.to_m": 240.0,
-}
 DROPPERS = {"name": "droppers", "kind": "dropper_lengths", "level": 5.0, "most": 20.0}
 SPEED = {"name": "speed", "kind": "key", "key": "train.speed_km_h", "level": 10.0, "most": 40.0}
 TENSION = {"name": "tension", "kind": "tension", "level": 2.0, "most": 10.0}
@@ -438,6 +426,11 @@ def test_an_installer_reads_which_criteria_nothing_helps_and_which_nothing_loses
 def test_errors_that_cannot_be_are_refused(errors: list[dict[str, Any]], says: str) -> None:
     with pytest.raises(InputError, match=says):
         make_plan(tiny(), task_of(*errors))
+
+
+def test_an_unknown_key_of_a_table_is_answered_with_the_keys_there() -> None:
+    with pytest.raises(InputError, match="samples.n in .* is unknown; it takes probability, conf"):
+        task_of(SPEED, samples={"n": 4})
 
 
 def test_the_verb_writes_what_it_says(

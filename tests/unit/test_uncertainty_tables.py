@@ -67,6 +67,19 @@ def folder(path: Path, runs: list[Ended], sample: dict[str, Any] | None = None) 
     return path
 
 
+def test_what_has_no_estimates_says_so() -> None:
+    """A run alone, runs that broke, and an input with the same value in all runs."""
+    rows = [
+        {"variant": i, "a": [1.0, 2.0], "b": i, "outcome": "done", "std_N": 2.0 + i} for i in (1, 2)
+    ]
+    none = "there are no estimates, which take figures of at least two runs"
+    assert none in evaluate(run_table(rows[:1])).notes
+    broken = evaluate(run_table([row | {"outcome": "broke", "std_N": None} for row in rows]))
+    assert broken.notes[:2] == [none, "2 runs of 2 did not end"]
+    notes = evaluate(run_table(rows)).notes
+    assert notes[0] == "a without an index: no two runs differ in it" and none not in notes
+
+
 def test_files_of_all_kinds_give_the_same_table(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     runs = some(range(1, 31))

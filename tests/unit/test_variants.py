@@ -130,3 +130,6 @@ def test_other_files_are_told(text: str, sentence: str, tmp_path: Path) -> None:
 def test_an_unknown_key_brings_the_nearest_one() -> None:
     with pytest.raises(InputError, match=r"did you mean train\.speed_km_h"):
         check_keys([Variant("v", ("train.sped_km_h=300",))], "on the command line (--vary)")
+    # The table in which it stands would be no help.
+    with pytest.raises(InputError, match="numerics.n .* is unknown; see `catenary list --keys`"):
+        check_keys([Variant("v", ("numerics.n=3",))], "on the command line (--vary)")

@@ -39,7 +39,7 @@ def test_differences_are_those_of_runs_by_hand(folder: Path) -> None:
     before, after = catenary.run(scene), catenary.run(scene.replace(train={"speed_km_h": 320}))
     table = {row["statistic"]: row for row in rows(folder / "statistics.csv")}
     for label, name in (
-        ("mean force [N]", "mean_N"),
+        ("mean contact force [N]", "mean_N"),
         ("standard deviation, 0-20 Hz [N]", "std_N"),
         ("minimum force [N]", "min_N"),
         ("contact point, vertical range [mm]", "contact_height_range_mm"),
@@ -72,6 +72,22 @@ def test_verdicts_that_turn_are_told(folder: Path) -> None:
         assert f"{name}: passed as it is, failed with the change" in said
     page = (folder / "what_if.html").read_text()
     assert "Uplift by support" in page and page.count("data:image/png") == 2
+
+
+def test_what_one_run_alone_has_is_told(tmp_path: Path) -> None:
+    """Figures and verdicts of a second pantograph, which hops behind the first one."""
+    pair = 'train.pantographs=[{name="reference"},{name="reference",behind_m=60}]'
+    said = invoke("what-if", CASE, "--short", "--set", pair, "-o", str(tmp_path)).output
+    fails = "standard deviation, 0.3 of the mean, trailing: no such criterion as it is, failed"
+    assert fails in said and "trailing: passed" not in said
+    found = {row["criterion"]: row for row in rows(tmp_path / "verdicts.csv")}
+    assert found["maximum contact force"]["verdict_changed"] == "no such criterion"
+    (row,) = [
+        row
+        for row in rows(tmp_path / "statistics.csv")
+        if row["of"] == "trailing" and row["statistic"] == "standard deviation, 0-20 Hz [N]"
+    ]
+    assert not row[AS_IT_IS] and not row["difference"] and float(row[CHANGED]) > 40.0
 
 
 def test_times_slack_are_counted_from_the_record(folder: Path) -> None:

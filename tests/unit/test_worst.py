@@ -231,8 +231,10 @@ def test_force_of_gusts_on_a_span() -> None:
 
 def test_without_gusts_none_press_and_what_is_like_the_others_needs_no_cause() -> None:
     assert gust_forces(at_rest("windy_viaduct", "effects.gusts=false"), [(605, 660, 0, 9)]) == []
-    assert worst_output._cause_lines([], True) == ["    no cause found"]
-    assert worst_output._cause_lines([], False) == worst_output._cause_lines([], None) == []
+    of = worst_output._with_candidates
+    assert of("5 m", True, []) == ("5 m; stands out", ["no cause found"])
+    assert of("5 m", True, ["a mass"])[1] == ["a mass"]
+    assert of("5 m", False, [])[1] == of("5 m", None, [])[1] == []
 
 
 @pytest.mark.study

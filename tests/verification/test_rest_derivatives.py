@@ -117,6 +117,15 @@ def test_the_program_ranks_what_changes_the_line_at_rest(tmp_path: Path) -> None
     assert again.exit_code == 2 and "sensitivity_at_rest.csv" in again.output
 
 
+def test_what_moves_no_wire_has_no_place() -> None:
+    """Droppers are cut for the messenger's tension, so that the contact wire stays: what is left is
+    round-off, whose largest value is anywhere."""
+    key = "line.messenger_wire.tension_N"
+    said = verb_runner.invoke("sensitivity", "en50318_2002", "--at-rest", "-p", key).output
+    (words,) = (line.split() for line in said.splitlines() if line.startswith(key))
+    assert float(words[4]) == 0.0 and words[5] == "-" and float(words[6]) < -2.0
+
+
 @pytest.mark.parametrize(
     ("key", "sentence"),
     [

@@ -144,6 +144,7 @@ def hard(
     from catenary.cases.studies.hard import checks
     from catenary.cases.studies.records import held_study
     from catenary.cases.terminal.runs_bar import RunsBar
+    from catenary.postproc.evaluate.wording import counted
     from catenary.postproc.report.study_table import Content, remark_lines, write_files
 
     if comm.size > 1 and runs.n_jobs != 1:
@@ -175,7 +176,7 @@ def hard(
     if files:
         console.say("\n".join(map(str, files)))
     console.say(
-        f"{len(cases)} hard cases on {comm.size} rank{'s' if comm.size > 1 else ''}: "
+        f"{counted(len(cases), 'hard case')} on {counted(comm.size, 'rank')}: "
         f"{len(found) - len(failed)} of {len(found)} limits kept"
     )
     return console.NOT_ACCEPTED if failed else console.DONE

@@ -19,6 +19,7 @@ from catenary.cases.cli.app import (
     folder_option,
     serial_verb,
 )
+from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -70,8 +71,8 @@ def pantograph(
 ) -> None:
     """Serial."""
     from catenary.cases.studies.pantograph_response import (
+        FILES,
         Range,
-        new_files,
         study,
         study_text,
         write_study,
@@ -79,7 +80,8 @@ def pantograph(
 
     over = Range(low, high, points, fit_low).checked()
     if out is not None:
-        new_files(out, force)
+        for name in FILES:
+            refuse_table(out / name, force)
     found = study(words.load(), kind, masses, over)
     console.say(study_text(found))
     if out is not None:
@@ -131,7 +133,6 @@ def sensitivity(
     force: Force = False,
 ) -> int:
     """Serial."""
-    from catenary.cases.result_folder.output_folder import refuse_table
     from catenary.sensitivities import AT_REST, SENSITIVITIES, derivatives, rest_derivatives
 
     scene = words.scene()
@@ -175,7 +176,6 @@ def identify(
     force: Force = False,
 ) -> int:
     """Serial."""
-    from catenary.cases.result_folder.output_folder import refuse_table
     from catenary.identifications import identified, task_of, write_identified
 
     wanted = task_of(task)

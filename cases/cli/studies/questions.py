@@ -223,11 +223,12 @@ def worst(
     if out is not None:
         refuse_impossible(out)
     console.alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.questions import worst_output
+    from catenary.cases.studies.questions.worst_output import answer_of
     from catenary.postproc.read.results import Results
+    from catenary.postproc.report.study_table import write_files
 
     with Results(folder, records) as results:
-        answer = worst_output.answer_of(results, count)
-    console.say(answer.text)
+        text, tables = answer_of(results, count)
+    console.say(text)
     if out is not None:
-        console.say("\n" + "\n".join(map(str, worst_output.write(out, answer))))
+        console.say("\n" + "\n".join(map(str, write_files(out, tables))))

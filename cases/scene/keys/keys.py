@@ -198,8 +198,12 @@ def nearest(key: str, known: Sequence[str]) -> str | None:
     close = difflib.get_close_matches(parts[-1], lasts, n=1, cutoff=0.75)
     if close:
         return _most_alike(key, named, close[0])
-    close = difflib.get_close_matches(key, named, n=1, cutoff=0.6)
-    return close[0].replace(ANY, "<name>") if close else None
+    for similar in difflib.get_close_matches(key, named, n=1, cutoff=0.6):
+        below = f"{similar}."
+        if key.startswith(below) and any(one.startswith(below) for one in known):
+            return None  # the table in which the key was written
+        return similar.replace(ANY, "<name>")
+    return None
 
 
 def _most_alike(key: str, known: list[str], last: str) -> str:

@@ -6,7 +6,7 @@ Pure functions on figures that are there already; ``cases/studies/accuracy/runs.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -44,13 +44,11 @@ class Found:
 
     Attributes
     ----------
-    pantographs : a table of figures of each, keys as in ``summary.json``
-    uplift : largest at a steady arm [mm], None if there is none
+    pantographs : statistics of each, those of the line with each
     histories : force below 20 Hz at common positions of each pantograph, (n,) [N]
     """
 
     pantographs: Sequence[dict[str, Any]]
-    uplift: float | None
     histories: Sequence[np.ndarray]
 
 
@@ -110,7 +108,7 @@ def compare(
     errors: dict[str, float] = {}
     percent: dict[str, float] = {}
     for name, quantity in QUANTITIES.items():
-        for own, other, scale in _pairs(name, quantity, found, reference, scale_of or reference):
+        for own, other, scale in _pairs(quantity, found, reference, scale_of or reference):
             if scale <= 0.0 or math.isnan(own - other):
                 continue
             share = 100.0 * abs(own - other) / scale
@@ -120,26 +118,19 @@ def compare(
 
 
 def _pairs(
-    name: str, quantity: Quantity, found: Found, reference: Found, scale_of: Found
-) -> list[tuple[float, float, float]]:
-    """Own value, the reference's and the scale, of each pantograph or of the line."""
-    if name == "uplift":
-        if found.uplift is None or reference.uplift is None or scale_of.uplift is None:
-            return []
-        return [(found.uplift, reference.uplift, scale_of.uplift)]
-    pairs = []
+    quantity: Quantity, found: Found, reference: Found, scale_of: Found
+) -> Iterator[tuple[float, float, float]]:
+    """Own value, the reference's and the scale, of each pantograph; of the history its rms."""
     tables = found.pantographs, reference.pantographs, scale_of.pantographs
     for p, (own, other, whole) in enumerate(zip(*tables, strict=True)):
-        if any(table.get("std_N") is None for table in (own, other, whole)):
+        if any(table[quantity.key or quantity.scale] is None for table in (own, other, whole)):
             continue
-        if name == HISTORY:
-            difference = found.histories[p] - reference.histories[p]
-            rms = float(np.sqrt(np.mean(difference**2)))
-            pairs.append((rms, 0.0, float(whole[quantity.scale])))
+        scale = abs(float(whole[quantity.scale]))
+        if quantity.key:
+            yield float(own[quantity.key]), float(other[quantity.key]), scale
         else:
-            figures = own[quantity.key], other[quantity.key], abs(whole[quantity.scale])
-            pairs.append((float(figures[0]), float(figures[1]), float(figures[2])))
-    return pairs
+            difference = found.histories[p] - reference.histories[p]
+            yield float(np.sqrt(np.mean(difference**2))), 0.0, scale
 
 
 def uncertainties(

@@ -19,7 +19,14 @@ from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
 from catenary.cases.studies.accuracy.axes import Axis, Level, Reference
-from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions, all_ended
+from catenary.cases.studies.sweep.jobs import (
+    AS_USUAL,
+    Ended,
+    Job,
+    RunOptions,
+    all_ended,
+    statistics_of,
+)
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, slug
 from catenary.postproc.evaluate import filters
@@ -250,10 +257,10 @@ def run(
         round_of = f"no. {number} of {plan.repeats}"
         options.progress(f"again, for their time, {round_of}: {len(short)} short runs")
         short.reverse()  # whatever else the machine does now and then meets others
-        again = []
-        for job in short:
-            variant = Variant(f"{job.variant.name}__again_{number}", job.variant.assignments)
-            again.append(replace(job, variant=variant))
+        again = [
+            replace(job, variant=replace(job.variant, name=f"{job.variant.name}__again_{number}"))
+            for job in short
+        ]
         repeated = all_ended(run_jobs(again, folder, comm, alone))
         every += repeated
         for job, one in zip(short, repeated, strict=True):
@@ -313,7 +320,7 @@ def _row(
         dict(level.sizes),
         errors,
         percent,
-        cost=min(costs) / summary["simulated_s"],
+        cost=min(costs, default=math.nan) / summary["simulated_s"],
         timings=len(costs),
         estimate=max(known, default=math.nan),
         iterations=counted["rounds"] / counted["steps"],
@@ -328,8 +335,7 @@ def _found(one: Ended) -> Found | None:
     if not one.done:
         return None
     histories = [np.array(values) for values in one.measured["histories"]]
-    uplift = one.summary["supports"]["max_uplift_mm"]
-    return Found(one.summary["pantographs"], uplift, histories)
+    return Found(statistics_of(one.summary), histories)
 
 
 def _cost(one: Ended) -> float:

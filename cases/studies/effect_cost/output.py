@@ -54,16 +54,14 @@ def changes(found: Costs, row: Measured) -> list[Change]:
     return result
 
 
-def _share(
-    before: dict[str, float | None], after: dict[str, float | None], name: str
-) -> float | None:
+def _share(before: dict[str, Any], after: dict[str, Any], name: str) -> float | None:
     a, b = before[name], after[name]
     if a is None and b is None:
         return None
     of = before[name if name in ("std_N", UPLIFT) else "mean_N"]
     if a is None or b is None or not of:
         return 0.0 if a == b else math.inf
-    return (b - a) / abs(of)
+    return float((b - a) / abs(of))
 
 
 def largest(found: Costs, row: Measured) -> Change | None:

@@ -21,7 +21,13 @@ from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import end_of, problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside, in_turns
-from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, interrupted
+from catenary.cases.studies.sweep.jobs import (
+    Ended,
+    Job,
+    RunOptions,
+    interrupted,
+    statistics_of,
+)
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.solver.effects import all_effects as effects
@@ -117,7 +123,7 @@ def _taken_along(name: str, among: Iterable[str], takes: Callable[[str, str], bo
 AS_IT_IS = "as-it-is"
 # Steps of a round at least, some milliseconds, and at most; a span between them.
 _FEWEST, _MOST = 200, 4000
-# Names of the figures, and their keys in a summary, of a pantograph and of the line.
+# The statistics that are compared, of a pantograph and of the line.
 FIGURES = ("mean_N", "std_N", "max_N", "min_N")
 UPLIFT = "max_uplift_mm"
 
@@ -163,7 +169,7 @@ class Measured:
     outcome : "done", or the sentence of what is not possible or broke
     size : of the line
     ratio : time of a step over that of the scene as it is
-    figures : of each pantograph, ``FIGURES`` by name; and ``UPLIFT`` of the line under that name
+    figures : of each pantograph, as ``statistics_of`` gives them
     remarks : sentences about what decides the run's results
     """
 
@@ -171,7 +177,7 @@ class Measured:
     outcome: str
     size: Size | None = None
     ratio: float = math.nan
-    figures: list[dict[str, float | None]] = field(default_factory=list)
+    figures: list[dict[str, Any]] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
 
     @property
@@ -326,11 +332,11 @@ def measure(
                 continue
             with RepeatedMarch(comm, rest_of(job.scene), first, n_steps) as march:
                 timed, own = beside(march, as_it_is, options.rounds), size_of(march)
-            figures = figures_of(one.summary)
+            figures = statistics_of(one.summary)
             rows.append(Measured(switch, "done", own, timed.ratio, figures, one.remarks))
             step = min(step, timed.least_of_other)
         size = size_of(as_it_is)
-    unchanged = Measured(UNSWITCHED, "done", size, 1.0, figures_of(whole.summary), whole.remarks)
+    unchanged = Measured(UNSWITCHED, "done", size, 1.0, statistics_of(whole.summary), whole.remarks)
     names = [one["name"] for one in whole.summary["pantographs"]]
     stretch = scene.evaluation.from_m, scene.evaluation.to_m
     return Costs(scene.case.name, options, effects, stretch, n_steps, step, names, unchanged, rows)
@@ -350,11 +356,3 @@ def _round_of(problem: Problem) -> tuple[int, int]:
 def size_of(march: RepeatedMarch) -> Size:
     """The size of a line that is marched. Not collective."""
     return Size(march.n_unknowns, march.unknowns_of_a_station, march.widths)
-
-
-def figures_of(summary: dict[str, Any]) -> list[dict[str, float | None]]:
-    """The figures of each pantograph in a summary, the line's uplift with each."""
-    uplift = summary["supports"][UPLIFT]
-    return [
-        {**{name: one[name] for name in FIGURES}, UPLIFT: uplift} for one in summary["pantographs"]
-    ]

@@ -31,17 +31,9 @@ _HEADING = "Validation by EN 50318"
 
 
 def statement_in(folder: Path) -> dict[str, Any]:
-    """The statement that a folder holds. Not collective.
+    """The statement that a folder of `catenary validate -o FOLDER` holds. Not collective.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of `catenary validate -o FOLDER`.
-
-    Returns
-    -------
-    dict
-        ``installation``, ``steps``, ``figures`` and ``closing`` of its record.
+    Returns ``installation``, ``steps``, ``figures`` and ``closing`` of its record.
 
     Raises
     ------
@@ -64,15 +56,8 @@ def statement_in(folder: Path) -> dict[str, Any]:
 
 
 def validation_section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:
-    """Validation of the program that made a run.
-
-    Parameters
-    ----------
-    statement : mapping or None
-        What ``statement_in`` found; None if no statement is at hand.
-    run : EvaluatedRun
-        Run.
-    """
+    """Validation of the program that made a run, by what ``statement_in`` found; None if no
+    statement is at hand."""
     if statement is None:
         text = (
             "No validation of this installation is at hand. `catenary validate -o STUDY` goes "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
-from catenary.cases.studies.questions.worst_output import candidates, scatter_words
+from catenary.cases.studies.questions.worst_output import worst_of_each
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.figures import (
@@ -47,21 +47,9 @@ def section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
 
 def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[Text | StudyTable]:
     names = results.pantograph_names()
-    if places.passages:
-        one = places.passages[0]
-        yield Text(
-            f"span {one.span + 1}, {one.start:.6g} to {one.end:.6g} m, {names[one.pantograph]}: "
-            f"standard deviation {one.std:.1f} N (median of all spans {one.median:.1f} N), force "
-            f"{one.minimum:.0f} to {one.maximum:.0f} N{scatter_words(one.stands_out)}.",
-            "note",
-            "Worst span:",
-            candidates(causes.of_passage(one), one.stands_out),
-        )
-    for first, spots, words in _KINDS:
-        for spot in spots(places)[:1]:
-            sentence = words.format(at=spot.place, v=spot.value, m=spot.median)
-            items = candidates(causes.at(spot), spot.stands_out)
-            yield Text(f"{sentence}{scatter_words(spot.stands_out)}.", "note", first, items)
+    for (noun, by), found in worst_of_each(places, causes, names, 1).items():
+        for sentence, candidates in found:
+            yield Text(f"{sentence}.", "note", f"Worst {noun} by {by}:", candidates)
     everywhere = causes.of_line()
     if everywhere:
         yield Text("acts on all spans alike:", "note", "The line as a whole", everywhere)
@@ -77,13 +65,6 @@ def _blocks(results: Results, places: WorstPlaces, causes: Causes) -> Iterator[T
     heads = ["span", "from, to [m]", "pantograph", "sigma [N]", "max [N]", "min [N]", "loss [%]"]
     if rows:
         yield texts_table(heads, rows, {0, 3, 4, 5, 6}, "Spans by standard deviation")
-
-
-_KINDS: tuple[tuple[str, Callable[[WorstPlaces], Sequence[Spot]], str], ...] = (
-    ("Worst support:", lambda p: p.arms, "{at}, uplift {v:.1f} mm (median {m:.1f} mm)"),
-    ("Worst dropper:", lambda p: p.forces, "{at}, up to {v:.0f} N (median {m:.0f} N)"),
-    ("Longest slack:", lambda p: p.slack, "dropper at {at}, {v:.2f} s (median {m:.2f} s)"),
-)
 
 
 def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:

@@ -12,7 +12,6 @@ from catenary.cases.scene.turned import DIRECTIONS
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.scene_sets import (
     BROKE,
-    OF_EACH_PANTOGRAPH,
     ErrorSamples,
     Evaluation,
     Member,
@@ -20,20 +19,13 @@ from catenary.cases.studies.scene_sets import (
     Wanted,
     members_of,
 )
+from catenary.cases.studies.sweep.jobs import statistics_of
 
 AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN = "as it is", "mesh x 2", "step / 2", "unseen errors"
 # Statistics that are compared, and the direction in which each gets worse.
 COMPARED = {"std_N": 1.0, "max_N": 1.0, "min_N": -1.0, "loss_percent": 1.0, "max_uplift_mm": 1.0}
 # Changes below this share, or this much of a percentage, are no change.
 _SAME = 0.005
-_OF_LINE = "max_uplift_mm"
-
-
-class Check(NamedTuple):
-    """A set of scenes under which designs are compared."""
-
-    name: str
-    scenes: SceneSet
 
 
 class Row(NamedTuple):
@@ -59,8 +51,10 @@ class Row(NamedTuple):
     outcome: str = "done"
 
 
-def checks_of(draft: Draft, task: OptimiseTask) -> list[Check]:
-    """The checks of a task, on the whole stretch of the case and in both directions.
+def checks_of(draft: Draft, task: OptimiseTask) -> dict[str, SceneSet]:
+    """Scenes under which designs are compared, by the names of checks of a task.
+
+    They are on the whole stretch of the case and in both directions.
 
     Raises
     ------
@@ -75,14 +69,12 @@ def checks_of(draft: Draft, task: OptimiseTask) -> list[Check]:
         SHORTER_STEP: [("numerics.dt_s", 0.5 * scene.numerics.dt_s, SHORTER_STEP)],
     }
     members = _possible(draft, members_of(both), task)
-    found = [
-        Check(name, SceneSet(draft.assigned(values), members)) for name, values in numerics.items()
-    ]
+    found = {name: SceneSet(draft.assigned(values), members) for name, values in numerics.items()}
     if task.checks.n_seeds and line_of(scene).dropper_x.size:
         unseen = both.model_copy(update={"errors": _unseen(task)})
         samples = [one for one in members_of(unseen) if one.seed is not None]
-        found.append(Check(UNSEEN, SceneSet(draft, _possible(draft, samples, task))))
-    return [Check(one.name, one.scenes.checked()) for one in found]
+        found[UNSEEN] = SceneSet(draft, _possible(draft, samples, task))
+    return {name: scenes.checked() for name, scenes in found.items()}
 
 
 def _possible(draft: Draft, members: Sequence[Member], task: OptimiseTask) -> list[Member]:
@@ -108,7 +100,7 @@ def _unseen(task: OptimiseTask) -> ErrorSamples:
 
 
 def compare(
-    checks: Sequence[Check],
+    checks: Mapping[str, SceneSet],
     searched: Sequence[str],
     shipped: Mapping[str, Any],
     optimum: Mapping[str, Any],
@@ -118,20 +110,20 @@ def compare(
 
     Parameters
     ----------
-    checks : with the scenes in which the designs are compared
+    checks : scenes in which the designs are compared, by name
     searched : directions that the search has seen
     shipped, optimum : the two designs, as values by dotted keys
     evaluation : runs the scenes
     """
-    places = [(check, member) for check in checks for member in check.scenes.members]
+    places = [(name, member) for name, scenes in checks.items() for member in scenes.members]
     wanted: list[Wanted] = [
-        (check.scenes, member, values) for values in (shipped, optimum) for check, member in places
+        (checks[name], member, values) for values in (shipped, optimum) for name, member in places
     ]
     summaries = evaluation.of(wanted)
     before, after = summaries[: len(places)], summaries[len(places) :]
     rows: list[Row] = []
-    for (check, member), one, other in zip(places, before, after, strict=True):
-        rows += _rows(check.name, member, member.direction in searched, one, other)
+    for (name, member), one, other in zip(places, before, after, strict=True):
+        rows += _rows(name, member, member.direction in searched, one, other)
     return rows
 
 
@@ -150,15 +142,13 @@ def _rows(
     )
     failed = sorted(after - before)
     return [
-        Row(*head, its["name"], _figures(one, own), _figures(other, its), failed)
-        for own, its in zip(one["pantographs"], other["pantographs"], strict=True)
+        Row(*head, its["pantograph"], _compared(own), _compared(its), failed)
+        for own, its in zip(statistics_of(one), statistics_of(other), strict=True)
     ]
 
 
-def _figures(summary: Mapping[str, Any], pantograph: Mapping[str, Any]) -> dict[str, float]:
-    found = {name: pantograph[name] for name in COMPARED if name in OF_EACH_PANTOGRAPH}
-    found[_OF_LINE] = summary["supports"][_OF_LINE]
-    return {name: value for name, value in found.items() if value is not None}
+def _compared(figures: Mapping[str, Any]) -> dict[str, float]:
+    return {name: figures[name] for name in COMPARED if figures[name] is not None}
 
 
 def change(row: Row, statistic: str) -> float:

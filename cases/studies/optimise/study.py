@@ -15,7 +15,7 @@ from catenary.cases.scene.load import Draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import FORWARD, has_mirrored_line, turned
 from catenary.cases.studies.optimise.checks import (
-    Check,
+    AS_IS,
     Row,
     checks_of,
     compare,
@@ -44,13 +44,13 @@ class Plan:
     task: OptimiseTask
     scenes: SceneSet
     variables: Variables
-    checks: Sequence[Check]
+    checks: Mapping[str, SceneSet]
     warnings: Sequence[str]
 
     @property
     def scene(self) -> Scene:
         """The case as shipped, whole."""
-        return self.checks[0].scenes.draft.scene()
+        return self.checks[AS_IS].draft.scene()
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
     searched = searched.assigned((key, value, "in search.values") for key, value in own)
     scenes = _of_any_values(SceneSet(searched, members_of(task.set)).checked())
     variables = variables_of(task.variables, whole)
-    checks = [Check(one.name, _of_any_values(one.scenes)) for one in checks_of(draft, task)]
+    checks = {name: _of_any_values(own) for name, own in checks_of(draft, task).items()}
     warnings = []
     if task.search.short:
         warnings.append(
@@ -251,7 +251,7 @@ def _rounded(problem: Problem, best: Point) -> Point:
 
 def _cut(plan: Plan, values: Mapping[str, Any]) -> StudyTable:
     """Lengths of the whole line's droppers, before and after."""
-    scenes = plan.checks[0].scenes
+    scenes = plan.checks[AS_IS]
     member = scenes.members[0]._replace(direction=FORWARD)
     try:
         return dropper_table(scenes.scene(member), scenes.scene(member, values))

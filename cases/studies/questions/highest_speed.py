@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import groupby, product
-from math import ceil, inf
+from math import ceil, inf, log10
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,7 +29,7 @@ from catenary.cases.studies.sweep.output import DIRECTION, remarks_of, table_of
 from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import VariedKey
 from catenary.cases.studies.sweep.variants import product as variants_of
-from catenary.postproc.evaluate.wording import decimals_that_tell, fixed
+from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Row, StudyTable, write_files
 
@@ -45,6 +45,8 @@ _PANELS = (
 )
 # Speeds of the first division at most, and the bounds of a scene's speed [km/h].
 MOST, _SLOWEST, _FASTEST = 2000, 1.0, 1000.0
+# Least distance of two speeds, which are whole multiples of a tenth of it [km/h].
+_CLOSEST = 1e-3
 
 
 class Speeds(NamedTuple):
@@ -77,10 +79,10 @@ class Speeds(NamedTuple):
                 f"{_SLOWEST:g} to {_FASTEST:g} km/h"
             )
         step, within = option("--step", "step"), option("--within", "within")
-        if not 0.0 < self.within <= self.step < inf:
+        if not _CLOSEST <= self.within <= self.step < inf:
             raise InputError(
-                f"{within} {self.within:g} {step} {self.step:g} is not possible: {within} is above "
-                f"0 and at most {step}"
+                f"{within} {self.within:g} {step} {self.step:g} is not possible: {within} is at "
+                f"least {_CLOSEST:g} km/h and at most {step}"
             )
         count = ceil((self.fastest - self.slowest) / self.step - 1e-9) + 1
         if count > MOST:
@@ -89,6 +91,11 @@ class Speeds(NamedTuple):
             )
         evenly = [round(self.slowest + number * self.step, 4) for number in range(count - 1)]
         return [*evenly, self.fastest]
+
+    @property
+    def form(self) -> str:
+        """Format of a speed that tells it from the next one, half of ``within`` away or more."""
+        return f".{max(1, ceil(-log10(0.5 * self.within)))}f"
 
 
 class Stretch(NamedTuple):
@@ -320,11 +327,12 @@ def _holds(ended: _Marched, name: str, names: Sequence[str], directions: Sequenc
 
 def table_of_criteria(study: SpeedStudy) -> StudyTable:
     """A row for each criterion: from where it holds to the highest speed, and what ends it."""
+    form = study.speeds.form
     columns = [
         Column("criterion", "criterion"),
-        Column("holds_from_km_h", "holds from", ".1f"),
-        Column("highest_km_h", "to [km/h]", ".1f"),
-        Column("fails_at_km_h", "fails at", ".1f"),
+        Column("holds_from_km_h", "holds from", form),
+        Column("highest_km_h", "to [km/h]", form),
+        Column("fails_at_km_h", "fails at", form),
         Column("direction", "direction"),
         Column("value"),
         Column("limit"),
@@ -362,23 +370,27 @@ def _cells(one: Holds, slowest: float) -> Row:
 
 def as_text(study: SpeedStudy) -> str:
     """The answer in a sentence, and the table of criteria."""
-    speeds, whole = study.speeds, study.holds[0]
-    counted = f"{len(study.holds) - 1} criteria judged here"
+    speeds, whole, *judged = study.speeds, *study.holds
+    hold = f"all {len(judged)} criteria judged here hold"
+    if len(judged) == 1:
+        hold = "the one criterion judged here holds"
     where = f"from {speeds.slowest:g} to {speeds.fastest:g} km/h"
-    if not study.holds[1:]:
+    if not judged:
         answer = f"No criterion is judged {where}."
     elif not whole.stretches:
-        answer = f"At no speed {where} all {counted} hold."
+        answer = f"At no speed {where} {hold}."
     else:
         first = whole.stretches[0]
-        answer = f"All {counted} hold from {first.slowest:.1f} to {first.fastest:.1f} km/h"
+        slowest, fastest = (format(speed, speeds.form) for speed in first[:2])
+        answer = f"{hold.capitalize()} from {slowest} to {fastest} km/h"
         if first.fails_at is None:
             answer += ", the end of the range."
         else:
             both = whole.direction == BOTH
             way = "in both directions" if both else f"in the {whole.direction} direction"
             by = "; ".join(whole.stopped_by)
-            answer += f"; at {first.fails_at:.1f} km/h stopped {way} by: {by}."
+            fails_at = format(first.fails_at, speeds.form)
+            answer += f"; at {fails_at} km/h stopped {way} by: {by}."
     n_speeds = len(study.ended) // len(study.directions)
     lines = [f"{study.case}, {n_speeds} speeds {where}. {answer}", ""]
     lines += [table_of_criteria(study).text(), ""]
@@ -387,10 +399,9 @@ def as_text(study: SpeedStudy) -> str:
     refused = [one for one in study.ended if not one.done]
     if refused:
         beyond = [float(one.variant.varied[KEY]) for one in refused]
-        slowest, fastest = min(beyond), max(beyond)
         lines.append(
-            f"{len(refused)} runs from {slowest:g} to {fastest:g} km/h could not be made and count "
-            f"as failed; the first: {refused[0].outcome}"
+            f"{counted(len(refused), 'run')} from {min(beyond):g} to {max(beyond):g} km/h could "
+            f"not be made and counted as failed; the first: {refused[0].outcome}"
         )
     directions = study.one_way or "Each speed was run in both directions, and counts if both hold."
     lines.append(f"{directions} Stretches narrower than {speeds.step:g} km/h may be missed.")

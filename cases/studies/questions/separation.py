@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.jobs import Ended
+from catenary.cases.studies.sweep.jobs import Ended, statistics_of
 from catenary.cases.studies.sweep.output import failed_criteria
 from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import Variant, text_of
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from catenary.cases.studies.waves.theory import WaveTheory
 
 TABLE, RECORD, PICTURE = "separation.csv", "separation.json", "separation.png"
-# Most distances of a study, and the bounds of a distance [m].
-MOST, _LEAST, _FARTHEST = 2000, 1.0, 1000.0
+# Most distances of a study, the bounds of a distance, and the least step between two [m].
+MOST, _LEAST, _FARTHEST, _CLOSEST = 2000, 1.0, 1000.0, 1e-3
 DISTANCE, PLACES = "separation_m", ("leading", "trailing")
 _UPLIFT = "max_uplift_mm"
 _OF_BOTH = (
@@ -82,8 +82,8 @@ class Distances(NamedTuple):
                 f"{_LEAST:g} to {_FARTHEST:g} m"
             )
         step = option("--step", "step")
-        if not 0.0 < self.step < inf:
-            raise InputError(f"{step} {self.step:g} is not possible: it is above 0 m")
+        if not _CLOSEST <= self.step < inf:
+            raise InputError(f"{step} {self.step:g} is not possible: it is at least {_CLOSEST:g} m")
         length = self.farthest - self.nearest
         if length / self.step > MOST:
             raise InputError(f"{step} {self.step:g} makes more than {MOST} distances")
@@ -169,17 +169,20 @@ def variant_of(scene: Scene, separation: float | None) -> Variant:
     ahead = [f"train.start_m={scene.train.start_m + separation:.10g}"]
     if scene.train.end_m is not None:  # of the leading one, too
         ahead.append(f"train.end_m={scene.train.end_m + separation:.10g}")
-    return Variant(f"{separation:g}m", (*ahead, f"train.pantographs={train}"))
+    return Variant(f"{separation:.8g}m", (*ahead, f"train.pantographs={train}"))
 
 
 def _row(separation: float | None, one: Ended) -> Row:
     row: dict[str, Any] = {DISTANCE: separation, "outcome": one.outcome}
-    found = one.summary.get("pantographs", [])
+    found = statistics_of(one.summary)
     for number, place in enumerate(PLACES):
         for name, _, _, key in _OF_BOTH:
             row[name.format(place)] = found[number][key] if number < len(found) else None
-    uplift = one.summary.get("supports", {}).get(_UPLIFT)
-    return row | {_UPLIFT: uplift, "failed": failed_criteria(one.summary), "remarks": one.remarks}
+    return row | {
+        _UPLIFT: found[0][_UPLIFT],
+        "failed": failed_criteria(one.summary),
+        "remarks": one.remarks,
+    }
 
 
 class Period(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,12 +14,23 @@ from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.toml_input import parse_assignment
-from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, all_done, all_ended, make_jobs
+from catenary.cases.studies.sweep.jobs import (
+    OF_LINE,
+    OF_PANTOGRAPH,
+    Ended,
+    Job,
+    RunOptions,
+    all_done,
+    all_ended,
+    make_jobs,
+    statistics_of,
+)
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant, check_keys
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.statistics import RunStatistics, slack_times
+from catenary.postproc.evaluate.statistics import slack_times
+from catenary.postproc.files.disk import plain
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures, overlays
@@ -31,40 +43,26 @@ PAGE = "what_if.html"
 _FORCE, _UPLIFT = "force", "uplift"
 _MOST_CHANGED = 3  # arms and droppers named on a terminal
 _VERDICTS = {None: "not judged", True: "passed", False: "failed"}
+_ABSENT = "no such criterion"  # such as of a second pantograph
 # Arms and droppers are the same ones in both runs where they stand so close [m].
 _SAME_PLACE = 1e-6
-_OF_FORCE = (
-    ("mean", "mean force [N]", 1.0),
-    ("std", "standard deviation, 0-20 Hz [N]", 1.0),
-    ("std_0_5", "standard deviation, 0-5 Hz [N]", 1.0),
-    ("std_5_20", "standard deviation, 5-20 Hz [N]", 1.0),
-    ("maximum", "maximum force [N]", 1.0),
-    ("minimum", "minimum force [N]", 1.0),
-    ("loss_percent", "loss of contact [%]", 1.0),
-    ("contact_height_range", "contact point, vertical range [mm]", 1e3),
-)
 
 
 class Differences(NamedTuple):
-    """Differences by a change: tables with the columns ``as_it_is``, ``changed``, ``difference``.
+    """Differences by a change.
 
     Attributes
     ----------
     case : name of the case
     changes : the assignments
-    statistics : of each pantograph, and of the line
-    supports : largest uplift at each steady arm that both runs have
-    droppers : largest and smallest force, and time slack, of each dropper that both runs have
-    criteria : values, limits and verdicts
+    tables : by name, with the columns ``as_it_is``, ``changed`` and ``difference``: statistics,
+        verdicts, and of each steady arm and dropper that both runs have
     remarks : sentences on each run that bear on its results, by its name
     """
 
     case: str
     changes: tuple[str, ...]
-    statistics: StudyTable
-    supports: StudyTable
-    droppers: StudyTable
-    criteria: StudyTable
+    tables: dict[str, StudyTable]
     remarks: dict[str, list[str]]
 
 
@@ -117,10 +115,12 @@ def differences(changes: Sequence[str], ended: Sequence[Ended], out: Path) -> Di
         return Differences(
             str(a.attributes["case"]),
             tuple(changes),
-            _statistics(of_a, of_b),
-            _by_place("Uplift by support", "arm", *arms, of_arms),
-            _by_place("Droppers", "dropper", *droppers, of_droppers),
-            _criteria(before.summary, after.summary),
+            {
+                "statistics": _statistics(before.summary, after.summary),
+                "verdicts": _criteria(before.summary, after.summary),
+                "supports": _by_place("Uplift by support", "arm", *arms, of_arms),
+                "droppers": _by_place("Droppers", "dropper", *droppers, of_droppers),
+            },
             {one.variant.name: one.remarks for one in ended},
         )
 
@@ -133,30 +133,27 @@ def _columns(name: str, head: str, form: str) -> list[Column]:
     return [Column(*one) for one in zip(keys, heads, forms, strict=True)]
 
 
-def _figures(name: str, first: float, second: float) -> dict[str, Any]:
+def _figures(name: str, first: float | None, second: float | None) -> dict[str, Any]:
     """Two values and their difference as cells; None for what is not known."""
-    values = {AS_IT_IS: first, CHANGED: second, DIFFERENCE: second - first}
-    return {_key(name, key): value if np.isfinite(value) else None for key, value in values.items()}
+    difference = None if first is None or second is None else second - first
+    values = {AS_IT_IS: first, CHANGED: second, DIFFERENCE: difference}
+    return {_key(name, key): plain(value) for key, value in values.items()}
 
 
 def _key(name: str, of: str) -> str:
     return f"{name}_{of}" if name else of
 
 
-def _statistics(a: RunStatistics, b: RunStatistics) -> StudyTable:
-    rows: list[dict[str, Any]] = [
-        {"of": p.name, "statistic": label}
-        | _figures("", factor * getattr(p, name), factor * getattr(q, name))
-        for p, q in zip(a.pantographs, b.pantographs, strict=False)
-        for name, label, factor in _OF_FORCE
+def _statistics(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
+    absent: dict[str, Any] = {}
+    pairs = list(zip_longest(statistics_of(before), statistics_of(after), fillvalue=absent))
+    of_all = [((own or other)["pantograph"], own, other, OF_PANTOGRAPH) for own, other in pairs]
+    rows = [
+        {"of": name, "statistic": column.meaning}
+        | _figures("", own.get(column.name), other.get(column.name))
+        for name, own, other, columns in [*of_all, ("line", *pairs[0], OF_LINE)]
+        for column in columns
     ]
-    of_line = (
-        ("largest uplift at arms [mm]", 1e3 * a.supports.maximum, 1e3 * b.supports.maximum),
-        ("droppers slackened", a.droppers.n_slackened, b.droppers.n_slackened),
-        ("maximum dropper force [N]", a.droppers.maximum, b.droppers.maximum),
-        ("minimum dropper force [N]", a.droppers.minimum, b.droppers.minimum),
-    )
-    rows += [{"of": "line", "statistic": name} | _figures("", *both) for name, *both in of_line]
     columns = [Column("of", "of"), Column("statistic", "statistic"), *_columns("", "", ".2f")]
     return StudyTable(columns, rows, "Statistics")
 
@@ -200,15 +197,15 @@ def _pairs(first: np.ndarray, second: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _criteria(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
-    second = {row["criterion"]: row for row in after["acceptance"]}
+    runs = [{row["criterion"]: row for row in one["acceptance"]} for one in (before, after)]
     rows, columns = [], [Column("criterion", "criterion")]
-    for row in before["acceptance"]:
-        if (other := second.get(row["criterion"])) is not None:
-            found = {"criterion": row["criterion"], "unit": row["unit"]}
-            for name, one in ((AS_IT_IS, row), (CHANGED, other)):
-                found |= {f"value_{name}": one["value"], f"limit_{name}": one["limit"]}
-                found[f"verdict_{name}"] = _VERDICTS[one["passed"]]
-            rows.append(found)
+    for criterion in dict.fromkeys([*runs[0], *runs[1]]):
+        row: dict[str, Any] = {"criterion": criterion}
+        for name, run in zip(WORDS, runs, strict=True):
+            own = run.get(criterion)
+            row[f"value_{name}"], row[f"limit_{name}"] = own and own["value"], own and own["limit"]
+            row[f"verdict_{name}"] = _VERDICTS[own["passed"]] if own else _ABSENT
+        rows.append(row | {"unit": runs[criterion not in runs[0]][criterion]["unit"]})
     for name, words in WORDS.items():
         columns += [
             Column(f"value_{name}", words, ".4g"),
@@ -220,23 +217,29 @@ def _criteria(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
 
 def as_text(found: Differences) -> str:
     """Statistics, verdicts that change, and what changes most of the line."""
-    lines = [f"{found.case} with {', '.join(found.changes)}", "", found.statistics.text(), ""]
-    rows = found.criteria.rows
-    turned = [row for row in rows if row["verdict_as_it_is"] != row["verdict_changed"]]
+    lines = [
+        f"{found.case} with {', '.join(found.changes)}",
+        "",
+        found.tables["statistics"].text(),
+        "",
+    ]
+    rows = found.tables["verdicts"].rows
+    verdicts = [(row["criterion"], row["verdict_as_it_is"], row["verdict_changed"]) for row in rows]
     lines += [
-        f"{row['criterion']}: {row['verdict_as_it_is']} as it is, {row['verdict_changed']} with "
-        "the change"
-        for row in turned
+        f"{criterion}: {first} as it is, {second} with the change"
+        for criterion, first, second in verdicts
+        if first != second and (_ABSENT not in (first, second) or "failed" in (first, second))
     ] or ["No verdict changes."]
-    for table, name, what in (
-        (found.supports, "uplift_mm", "Uplift at {x:g} m: {a:.1f} -> {b:.1f} mm"),
-        (found.droppers, "max_N", "Largest force of the dropper at {x:g} m: {a:.1f} -> {b:.1f} N"),
+    for places, name, what in (
+        ("supports", "uplift_mm", "Uplift at {x:g} m: {a:.1f} -> {b:.1f} mm"),
+        ("droppers", "max_N", "Largest force of the dropper at {x:g} m: {a:.1f} -> {b:.1f} N"),
     ):
         key = f"{name}_{DIFFERENCE}"
-        places = [row for row in table.rows if row["evaluated"] and row[key] is not None]
+        of_table = found.tables[places].rows
+        changed = [row for row in of_table if row["evaluated"] and row[key] is not None]
         lines += [
             what.format(x=row["x_m"], a=row[f"{name}_{AS_IT_IS}"], b=row[f"{name}_{CHANGED}"])
-            for row in sorted(places, key=lambda row: -abs(row[key]))[:_MOST_CHANGED]
+            for row in sorted(changed, key=lambda row: -abs(row[key]))[:_MOST_CHANGED]
         ]
     named = [(WORDS[name], texts) for name, texts in found.remarks.items()]
     return "\n".join([*lines, *remark_lines(named)])
@@ -253,13 +256,8 @@ def write(folder: Path, found: Differences) -> list[Path]:
     return write_files(
         folder,
         {f"{name}.png": data for name, data in pictures.items()}
-        | {
-            "statistics.csv": found.statistics,
-            "supports.csv": found.supports,
-            "droppers.csv": found.droppers,
-            "verdicts.csv": found.criteria,
-            PAGE: page(title, lead, _sections(found), pictures),
-        },
+        | {f"{name}.csv": table for name, table in found.tables.items()}
+        | {PAGE: page(title, lead, _sections(found), pictures)},
     )
 
 
@@ -268,8 +266,8 @@ def _sections(found: Differences) -> Iterator[Section]:
         Picture(_FORCE, "Contact force, 20 Hz low-pass, along the track"),
         Picture(_UPLIFT, "Largest uplift at each steady arm"),
     ]
-    for table in (found.statistics, found.criteria, found.supports, found.droppers):
-        pictures = shown if table is found.statistics else []
+    for name, table in found.tables.items():
+        pictures = shown if name == "statistics" else []
         yield Section(table.title, [replace(table, title="")], pictures)
     remarks = [
         Text(text, "remark", f"{WORDS[name]}: ")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 from catenary.base.errors import CatenaryError
 from catenary.cases.run.prepared import rest_of
@@ -12,23 +10,15 @@ from catenary.cases.scene.load import recorded_scene
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.study_table import StudyTable, file_table, write_files
+from catenary.postproc.report.study_table import Content, StudyTable, file_table
 
 NONE = "no cause found"
 _MOST_CAUSES = 4  # of a place in the text; tables have all
 
 
-class Answer(NamedTuple):
-    """The tables of spans, supports and droppers, whole, and a text about the worst of each."""
-
-    spans: StudyTable
-    supports: StudyTable
-    droppers: StudyTable
-    text: str
-
-
-def answer_of(results: Results, count: int) -> Answer:
-    """Find the worst places of a run and candidates for their causes. Not collective.
+def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:
+    """A text about the worst places of a run with candidates for their causes, and tables of all
+    places by names of files. Not collective.
 
     Parameters
     ----------
@@ -45,13 +35,12 @@ def answer_of(results: Results, count: int) -> Answer:
     ]
     if not places.passages:
         lines.append("No span lies whole within the evaluated stretch and the record.")
-    lines += _of_spans(places.passages, causes, names, count)
-    for title, spots, words in (
-        ("Supports by uplift", places.arms, "{at}: {v:.1f} mm, median {m:.1f} mm"),
-        ("Droppers by largest force", places.forces, "{at}: {v:.0f} N, median {m:.0f} N"),
-        ("Droppers by time slack", places.slack, "{at}: {v:.2f} s, median {m:.2f} s"),
-    ):
-        lines += _of_spots(title, spots[:count], words, causes)
+    for (noun, by), found in worst_of_each(places, causes, names, count).items():
+        lines += ["", f"{noun.capitalize()}s by {by}"]
+        for sentence, candidates in found:
+            more = len(candidates) - _MOST_CAUSES
+            lines += [f"  {sentence}", *(f"    {text}" for text in candidates[:_MOST_CAUSES])]
+            lines += [f"    and {more} more (-o)"] if more > 0 else []
     everywhere = causes.of_line()
     if everywhere:
         lines += ["", "Of the line as a whole:", *(f"  {text}" for text in everywhere)]
@@ -70,7 +59,8 @@ def answer_of(results: Results, count: int) -> Answer:
         ("x_m", "wire", "max_uplift_mm", "median_mm", "stands_out", "causes"),
         ((*arm[1:], causes.at(arm)) for arm in places.arms),
     )
-    return Answer(spans, supports, _droppers_table(places, causes), text)
+    tables = {"spans": spans, "supports": supports, "droppers": _droppers_table(places, causes)}
+    return text, {f"worst_{name}.csv": own for name, own in tables.items()}
 
 
 def _causes(results: Results, passages: Sequence[Passage]) -> tuple[Causes, str]:
@@ -82,52 +72,59 @@ def _causes(results: Results, passages: Sequence[Passage]) -> tuple[Causes, str]
         return Causes(results, passages, None), str(error)
 
 
-def _of_spans(
-    passages: Sequence[Passage], causes: Causes, names: Sequence[str], count: int
-) -> list[str]:
-    """The worst passage of each of the worst spans."""
-    lines = ["", "Spans by standard deviation"] if passages else []
+# What is worst of a kind and by which figure, and what is said of a spot.
+_SPOTS: tuple[tuple[tuple[str, str], Callable[[WorstPlaces], Sequence[Spot]], str], ...] = (
+    (("support", "uplift"), lambda p: p.arms, "{at}: {v:.1f} mm, median {m:.1f} mm"),
+    (("dropper", "largest force"), lambda p: p.forces, "{at}: {v:.0f} N, median {m:.0f} N"),
+    (("dropper", "time slack"), lambda p: p.slack, "{at}: {v:.2f} s, median {m:.2f} s"),
+)
+
+
+def worst_of_each(
+    places: WorstPlaces, causes: Causes, names: Sequence[str], count: int
+) -> dict[tuple[str, str], list[tuple[str, Sequence[str]]]]:
+    """Sentences on the worst places of each kind, by what they are and by which figure, each with
+    candidates for its cause.
+
+    Parameters
+    ----------
+    names : of the pantographs
+    count : places of a kind, of spans the worst passage of each
+    """
     worst: dict[int, Passage] = {}
-    for one in passages:
-        worst.setdefault(one.span, one)
+    for passage in places.passages:
+        worst.setdefault(passage.span, passage)
+    spans = []
     for one in list(worst.values())[:count]:
         who = f", {names[one.pantograph]}" if len(names) > 1 else ""
-        lines.append(
-            f"  span {one.span + 1}, {one.start:.0f} to {one.end:.0f} m{who}: {one.std:.1f} N, "
+        sentence = (
+            f"span {one.span + 1}, {one.start:.6g} to {one.end:.6g} m{who}: {one.std:.1f} N, "
             f"median {one.median:.1f} N, force {one.minimum:.0f} to {one.maximum:.0f} N"
-            f"{scatter_words(one.stands_out)}"
         )
-        lines += _cause_lines(causes.of_passage(one), one.stands_out)
-    return lines
+        spans.append(_with_candidates(sentence, one.stands_out, causes.of_passage(one)))
+    found = {("span", "standard deviation"): spans}
+    for kind, spots, words in _SPOTS:
+        found[kind] = [
+            _with_candidates(
+                words.format(at=spot.place, v=spot.value, m=spot.median),
+                spot.stands_out,
+                causes.at(spot),
+            )
+            for spot in spots(places)[:count]
+        ]
+    return {kind: own for kind, own in found.items() if own}
 
 
-def _of_spots(title: str, spots: Sequence[Spot], words: str, causes: Causes) -> list[str]:
-    lines = ["", title] if spots else []
-    for one in spots:
-        sentence = words.format(at=one.place, v=one.value, m=one.median)
-        lines.append(f"  {sentence}{scatter_words(one.stands_out)}")
-        lines += _cause_lines(causes.at(one), one.stands_out)
-    return lines
-
-
-def candidates(causes_found: Sequence[str], is_out: bool | None) -> Sequence[str]:
-    """Candidate causes of a place. Where ``causes_found`` is empty and the place stands out from
-    its likes, ``is_out``, a sentence that there is none."""
-    return causes_found or ([NONE] if is_out else [])
-
-
-def _cause_lines(causes_found: Sequence[str], is_out: bool | None) -> list[str]:
-    """Lines for the candidates of a place."""
-    lines = [f"    {text}" for text in candidates(causes_found, is_out)[:_MOST_CAUSES]]
-    more = len(causes_found) - _MOST_CAUSES
-    return [*lines, f"    and {more} more (-o)"] if more > 0 else lines
-
-
-def scatter_words(is_out: bool | None) -> str:
-    """Whether a figure stands out among its likes, None if they are too few, in words."""
+def _with_candidates(
+    sentence: str, is_out: bool | None, candidates: list[str]
+) -> tuple[str, Sequence[str]]:
+    """The sentence with whether the place stands out, None if its likes are too few, and its
+    candidates; if one that does has none, that it has none."""
     if is_out is None:
-        return "; too few others to compare"
-    return "; stands out" if is_out else "; within the scatter of the others"
+        return f"{sentence}; too few others to compare", candidates
+    if not is_out:
+        return f"{sentence}; within the scatter of the others", candidates
+    return f"{sentence}; stands out", candidates or [NONE]
 
 
 def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
@@ -141,9 +138,3 @@ def _droppers_table(places: WorstPlaces, causes: Causes) -> StudyTable:
         cells.append((one.x, one.wire, *values, causes.at(one)))
     heads = ("x_m", "wire", "max_N", "usual_max_N", "min_N", "slack_s", "stands_out", "causes")
     return file_table(heads, cells)
-
-
-def write(folder: Path, answer: Answer) -> list[Path]:
-    """Write the three tables; returns the files. Not collective."""
-    tables = {"spans": answer.spans, "supports": answer.supports, "droppers": answer.droppers}
-    return write_files(folder, {f"worst_{name}.csv": own for name, own in tables.items()})

@@ -10,7 +10,13 @@ import numpy as np
 from catenary.cases.scene.line.line_data import span_lengths
 from catenary.cases.studies.accuracy.analysis import extrapolated_error
 from catenary.cases.studies.reference.configurations import Configuration, table
-from catenary.cases.studies.sweep.jobs import OF_PANTOGRAPH, STATISTICS, Ended, Job
+from catenary.cases.studies.sweep.jobs import (
+    OF_PANTOGRAPH,
+    STATISTICS,
+    Ended,
+    Job,
+    statistics_of,
+)
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.report.study_table import Column
 
@@ -75,12 +81,13 @@ def figures_of(summary: Mapping[str, Any]) -> dict[tuple[str, str], float]:
     ----------
     summary : content of ``summary.json``
     """
+    rows = statistics_of(summary)
     found = {
-        (one["name"], column.name): float(one[column.name])
-        for one in summary["pantographs"]
+        (row["pantograph"], column.name): float(row[column.name])
+        for row in rows
         for column in OF_FORCE
     }
-    found[LINE, UPLIFT] = float(summary["supports"][UPLIFT])
+    found[LINE, UPLIFT] = float(rows[0][UPLIFT])
     for which in ("max", "min"):
         elasticity = summary["static"]["elasticity_mm_per_N"][which]
         found[LINE, f"elasticity_{which}_mm_per_N"] = float(elasticity)

@@ -109,10 +109,17 @@ def _add_statistics(
             raise InputError(
                 f'{name} has no column "{column}": a table of statistics has {", ".join(needed)}'
             )
+    if table.empty:
+        raise InputError(f"{name} has no rows: it gives no statistics to judge")
     values = column_of(table, name, _VALUE)
     for row, value in zip(table.to_dict("records"), values.tolist(), strict=True):
         of, quantity = str(row[_OF]), str(row[_QUANTITY])
         own = configuration or str(row[_CONFIGURATION])
+        if own != str(row.get(_CONFIGURATION, own)):
+            raise InputError(
+                f"{name} has statistics of {plain(str(row[_CONFIGURATION]), 60)}, and --of names "
+                f"{plain(own, 60)}: leave --of away"
+            )
         one = found.setdefault(own, Others(read(own)))
         if (of, quantity) not in one.solution.figures:
             known = ", ".join(q for place, q in one.solution.figures if place == of)
@@ -121,10 +128,16 @@ def _add_statistics(
                 f'{name} has "{plain(quantity, 60)}" of "{plain(of, 60)}": {own} has '
                 + (f"of it {known}" if known else f"figures of {places}")
             )
-        if (of, quantity) in one.figures:
-            raise InputError(f"{name} has {quantity} of {of} for {own} more than once")
         _check_unit(one.solution, of, quantity, value, name)
-        one.figures[of, quantity] = value
+        _add(one, of, quantity, value, name)
+
+
+def _add(one: Others, of: str, quantity: str, value: float, name: str) -> None:
+    """Add a figure; raises InputError if the files give it twice."""
+    if (of, quantity) in one.figures:
+        where = one.solution.configuration.name
+        raise InputError(f"{name} gives {quantity} of {of} for {where}, which was given before")
+    one.figures[of, quantity] = value
 
 
 def _check_unit(solution: Solution, of: str, quantity: str, value: float, name: str) -> None:
@@ -169,10 +182,10 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
             own = {key: getattr(found, word) for key, word in _FROM_STATISTICS.items()}
             curve = CubicSpline(place, filters.low_pass(force, dt))
         _check_unit(solution, of, "mean_N", own["mean_N"], name)
-        one.figures |= {(of, column.name): own[column.name] for column in OF_FORCE
-                        if column.name in own}  # fmt: skip
         one.forces[of] = curve(solution.place)
-        one.figures[of, HISTORY] = rms(one.forces[of] - solution.forces[of])
+        for quantity in (column.name for column in OF_FORCE if column.name in own):
+            _add(one, of, quantity, own[quantity], name)
+        _add(one, of, HISTORY, rms(one.forces[of] - solution.forces[of]), name)
 
 
 def _places_of(
@@ -204,6 +217,6 @@ def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:
     beyond = min(start - place[0], place[-1] - end)
     if beyond < reach:
         one.remarks.append(
-            f"The record of the {of} goes on only {beyond:.1f} m beyond the stretch: the 20 Hz "
+            f"The record of {of}_N goes on only {beyond:.1f} m beyond the stretch: the 20 Hz "
             f"filter needs {reach:.0f} m, and the force near its end is distorted."
         )

@@ -49,23 +49,20 @@ def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
     rows = rows_of(others)
     table = table_of(rows, "Figures")
     pictures: dict[str, bytes] = {}
-    for one in others:
-        if one.forces:
-            name = one.solution.configuration.name
-            place, reference = one.solution.place, one.solution.forces
-            panels = [
-                (of, [("reference", place, reference[of]), ("judged", place, force)])
-                for of, force in one.forces.items()
-            ]
-            pictures |= figures.painted(name, partial(overlays.forces, panels))
     sections = []
     for one in others:
-        name = one.solution.configuration.name
+        about, place = one.solution.configuration, one.solution.place
+        panels = [
+            (of, [("reference", place, one.solution.forces[of]), ("judged", place, force)])
+            for of, force in one.forces.items()
+        ]
+        if panels:
+            pictures |= figures.painted(about.name, partial(overlays.forces, panels))
         own = replace(table, rows=judged(one.solution, one.figures), title="")
-        blocks: list[Text | StudyTable] = [Text(one.solution.configuration.data), own]
+        blocks: list[Text | StudyTable] = [Text(about.data), own]
         blocks += [Text(text, "remark") for text in one.remarks]
-        shown = [Picture(name, "Contact force, 20 Hz low-pass, along the track")]
-        sections.append(Section(one.solution.configuration.words, blocks, shown))
+        shown = [Picture(about.name, "Contact force, 20 Hz low-pass, along the track")]
+        sections.append(Section(about.words, blocks, shown))
     lead = f"{counts(rows)} {_BORROWED} {UNCOMPARED_SAYS}."
     content: dict[str, Content] = {f"{name}.png": data for name, data in pictures.items()}
     content[f"{JUDGED}.csv"] = table

@@ -153,14 +153,14 @@ def _values(key: str, table: FieldTable, normal: np.ndarray, where: str) -> np.n
 
 
 def _dropper_lengths(scene: Scene, line: Line, table: FieldTable) -> Carrier:
-    which = _numbered_droppers(line)
+    which = line.numbered_droppers
     own = np.zeros(len(which))
     given = scene.irregularities.dropper_lengths
     number = {place: i for i, place in enumerate(which)}
     for span, dropper, error in (given.by_dropper if given is not None else None) or ():
         own[number[int(span), int(dropper)]] += error
     template = ", ".join(f"[{span}, {dropper}, %.4f]" for span, dropper in which)
-    return Carrier(_dropper_places(line), own, _filled(f"[{template}]"))
+    return Carrier(np.array([*which.values()]), own, _filled(f"[{template}]"))
 
 
 def _heights(name: str, usual: str) -> Callable[[Scene, Line, FieldTable], Carrier]:
@@ -202,7 +202,7 @@ def _spans(scene: Scene, line: Line, table: FieldTable) -> Carrier:
 
 def _defects(scene: Scene, line: Line, table: FieldTable) -> Carrier:
     assert isinstance(table, ChanceField)
-    which, kind = _numbered_droppers(line), table.defect
+    which, kind = line.numbered_droppers, table.defect
     own = [text_of(one.model_dump(exclude_none=True)) for one in scene.defects]
     spared = {
         (getattr(one, "span", 0), getattr(one, "dropper", 0)) for one in scene.defects
@@ -217,7 +217,7 @@ def _defects(scene: Scene, line: Line, table: FieldTable) -> Carrier:
         found = (entries[i] for i in np.flatnonzero(values))
         return f"[{', '.join([*own, *filter(None, found)])}]"
 
-    return Carrier(_dropper_places(line), np.zeros(len(which)), text)
+    return Carrier(np.array([*which.values()]), np.zeros(len(which)), text)
 
 
 def _filled(template: str) -> Callable[[np.ndarray], str]:
@@ -227,21 +227,6 @@ def _filled(template: str) -> Callable[[np.ndarray], str]:
 
 def _list_of(n: int) -> str:
     return f"[{', '.join(['%.7f'] * n)}]"
-
-
-def _numbered_droppers(line: Line) -> list[tuple[int, int]]:
-    """Span and number in the span of all droppers, both from 1."""
-    return [
-        (span + 1, dropper + 1)
-        for span in range(line.n_spans)
-        for dropper in range(len(line.droppers_of_span(span)))
-    ]
-
-
-def _dropper_places(line: Line) -> np.ndarray:
-    """Places of the droppers within spans, in the same order [m]."""
-    spans = [line.droppers_of_span(span) for span in range(line.n_spans)]
-    return np.concatenate([np.zeros(0), *spans])
 
 
 _CARRIERS: dict[str, Callable[[Scene, Line, FieldTable], Carrier]] = {

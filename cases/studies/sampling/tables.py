@@ -12,10 +12,7 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import refuse_deep
 from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import known_keys, names_value
 from catenary.cases.scene.keys.table import Table
-from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sampling.distributions import (
     ChanceTable,
     ChoicesTable,
@@ -26,6 +23,7 @@ from catenary.cases.studies.sampling.distributions import (
     TruncatedNormalTable,
     UniformTable,
 )
+from catenary.cases.studies.sweep.variants import check_key
 from catenary.cases.studies.task_files import checked_table
 
 MOST_SAMPLES = 100_000
@@ -204,15 +202,13 @@ def sampling_of(raw: Mapping[str, Any], file: str) -> SamplingTable:
         for name, value in raw.items()
     }
     table = checked_table(tables, SamplingTable, file)
-    known = known_keys(Scene)
     for key in (*table.keys, *table.fields):
         if key.split(".")[0] == "petsc":
             raise InputError(
                 f"{key} in {file} cannot vary: PETSc takes its options once, when the program "
                 "starts"
             )
-        if not names_value(key, known):
-            raise InputError(unknown_key(key, f"in {file}", known))
+        check_key(key, f"in {file}")
         if key in table.keys and key in table.fields:
             raise InputError(f"{shown(key)[1:-1]} in {file} is in keys and in fields; keep one")
     return table

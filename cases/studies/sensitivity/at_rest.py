@@ -18,6 +18,8 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.set_up import STENCIL, derivative
 
 _MM = 1e3
+# Half of the last digit of a height's change [mm]: a smaller one is round-off, which has no place.
+_SEEN = 0.5e-3
 
 
 @dataclass(frozen=True)
@@ -177,14 +179,15 @@ def summary(found: RestSensitivity) -> StudyTable:
         moved = np.nan_to_num(found.by_height[m])
         place, wire = np.unravel_index(np.abs(moved).argmax(), moved.shape)
         change = parameter.change
+        height = _MM * change * float(moved[place, wire])
         rows.append(
             {
                 "parameter": parameter.key,
                 "shown": parameter.text,
                 "unit": parameter.unit,
                 "change": change,
-                "height": _MM * change * float(moved[place, wire]),
-                "at": float(found.x[place]),
+                "height": height,
+                "at": float(found.x[place]) if abs(height) >= _SEEN else None,
                 "mean": 100.0
                 * change
                 * float(found.by_elasticity[m].sum() / found.elasticity.sum()),

@@ -76,9 +76,9 @@ def as_text(found: Sensitivity) -> str:
     lines = []
     for name, own in zip(found.names, found.statistics, strict=True):
         lines.append(
-            f"{name}: mean {own.mean:.2f} N, sigma {own.std:.2f} N, "
-            f"statistical minimum {own.mean - 3.0 * own.std:.1f} N, "
-            f"least {own.minimum:.1f} N, largest {own.maximum:.1f} N"
+            f"{name}: mean {own['mean']:.2f} N, sigma {own['std']:.2f} N, "
+            f"statistical minimum {own['mean'] - 3.0 * own['std']:.1f} N, "
+            f"least {own['min']:.1f} N, largest {own['max']:.1f} N"
         )
     if not np.isnan(found.max_uplift):
         lines.append(f"largest uplift {found.max_uplift * _MM:.1f} mm")

@@ -27,13 +27,11 @@ from catenary.cases.run.prepared import rest_of
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import Origin, shown
 from catenary.cases.scene.input.toml_input import value_at
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import known_keys, names_value
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.load import Shared, scene_from
 from catenary.cases.scene.problem import line_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.variants import is_number
+from catenary.cases.studies.sweep.variants import check_key, is_number
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.statics.line_at_rest import LineAtRest, SoundLine, line_at_rest, sound_line
 
@@ -220,11 +218,8 @@ class ChangedScenes:
             return self._length_of(key, *map(int, dropper.groups()))
         if support := _OF_SUPPORT.fullmatch(key):
             return self._height_at(key, int(support[1]))
-        known = known_keys(Scene)
         parts = key.split(".")
-        if not names_value(key, known):
-            where = where or f"in {option('--parameter', 'parameters')}"
-            raise InputError(unknown_key(key, where, known))
+        check_key(key, where or f"in {option('--parameter', 'parameters')}")
         if parts[0] == "pantographs" and len(parts) > 2:
             if self._is_ready(parts[1]):
                 model = self._raw["pantographs"][parts[1]]["model"]
@@ -258,11 +253,10 @@ class ChangedScenes:
 
     def droppers(self) -> list[Parameter]:
         """The length of each dropper in the evaluated stretch."""
-        line, evaluation = line_of(self.scene), self.scene.evaluation
+        evaluation = self.scene.evaluation
         return [
-            self.parameter(f"{_LENGTHS}.{span + 1}.{number + 1}")
-            for span in range(line.n_spans)
-            for number, x in enumerate(line.droppers_of_span(span))
+            self.parameter(f"{_LENGTHS}.{span}.{number}")
+            for (span, number), x in line_of(self.scene).numbered_droppers.items()
             if evaluation.from_m <= x <= evaluation.to_m
         ]
 
@@ -274,12 +268,14 @@ class ChangedScenes:
         InputError
             If the line has no such span, or no droppers in it.
         """
-        line, found = line_of(self.scene), []
-        for span in dict.fromkeys(spans):
-            if span > line.n_spans:
-                raise InputError(f"droppers.spans names span {span}: the line has {line.n_spans}")
-            for number in range(1, len(line.droppers_of_span(span - 1)) + 1):
-                found.append(self.parameter(f"{_LENGTHS}.{span}.{number}"))
+        line = line_of(self.scene)
+        if max(spans) > line.n_spans:
+            raise InputError(f"droppers.spans names span {max(spans)}: the line has {line.n_spans}")
+        found = [
+            self.parameter(f"{_LENGTHS}.{span}.{number}")
+            for span in dict.fromkeys(spans)
+            for number in range(1, len(line.droppers_of_span(span - 1)) + 1)
+        ]
         if not found:
             raise InputError(f"droppers.spans names {list(spans)}: these spans have no droppers")
         return found

@@ -33,16 +33,6 @@ from catenary.solver.tangents.set_up import (
 _BYTES = 2**28
 
 
-@dataclass(frozen=True)
-class Statistics:
-    """Statistics of a pantograph's contact force below 20 Hz in the evaluated stretch [N]."""
-
-    mean: float
-    std: float
-    maximum: float
-    minimum: float
-
-
 @dataclass
 class Sensitivity:
     """A case differentiated by parameters.
@@ -50,7 +40,8 @@ class Sensitivity:
     Attributes
     ----------
     names : of the pantographs
-    statistics : of each of them
+    statistics : "mean", "std", "max" and "min" of the force of each of them below 20 Hz in the
+        evaluated stretch [N]
     max_uplift : largest uplift of evaluated arms [m], NaN if there are none
     parameters : by which it was differentiated
     by_force : of each parameter, for each pantograph, derivatives of its statistics per unit of the
@@ -62,7 +53,7 @@ class Sensitivity:
     """
 
     names: list[str]
-    statistics: list[Statistics]
+    statistics: list[dict[str, float]]
     max_uplift: float
     n_steps: int
     contact_switches: int
@@ -179,8 +170,8 @@ def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
     statistics = []
     for number, within in _within(marched, at_rest):
         force = filters.low_pass(marched.force[:, number], marched.dt)[within]
-        figures = (force.mean(), force.std(), force.max(), force.min())
-        statistics.append(Statistics(*map(float, figures)))
+        figures = ("mean", "std", "max", "min")
+        statistics.append({name: float(getattr(force, name)()) for name in figures})
     n = len(statistics)
     middle = [f"no. {place}" for place in range(2, n)]
     names = ["pantograph"] if n == 1 else ["leading", *middle, "trailing"]

@@ -3,62 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.postproc.evaluate.statistics import HISTOGRAM_BIN
-from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Content
+from catenary.postproc.report.study_table import Content, file_table
 
 TABLE, PICTURE = "force_histogram.csv", "force_histogram.png"
 _LOW, _HIGH = 0.05, 0.95
 
 
-class ForceHistograms(NamedTuple):
-    """Histograms of the filtered contact force over bins that all rows share.
+def force_histograms(ended: Sequence[Ended]) -> pd.DataFrame | None:
+    """Share of time in bins of the filtered contact force [%]; None if no variant has some.
 
-    Attributes
-    ----------
-    variants, pantographs : (n_rows,) names
-    edges : (n_bins + 1,) of the bins [N]
-    percent : (n_rows, n_bins) share of time in each bin [%]
-    """
-
-    variants: Sequence[str]
-    pantographs: Sequence[str]
-    edges: np.ndarray
-    percent: np.ndarray
-
-
-def force_histograms(ended: Sequence[Ended]) -> ForceHistograms | None:
-    """The histograms of all variants that have some; None if there are none.
-
+    A row for each variant and pantograph, a column for each bin under its lower edge [N].
     Pantographs without statistics have none. Left out too are those whose force spans so much,
     above 10 kN, that their bins are wider than others.
     """
-    known = [
-        (one.variant.name, own["name"], own)
+    known = {
+        (one.variant.name, own["name"]): own
         for one in ended
         for own in one.summary.get("histograms", [])
         if own["bin_N"] == HISTOGRAM_BIN
-    ]
+    }
     if not known:
         return None
-    variants, pantographs, own = zip(*known, strict=True)
-    starts = [round(one["from_N"] / HISTOGRAM_BIN) for one in own]
+    starts = [round(own["from_N"] / HISTOGRAM_BIN) for own in known.values()]
+    shares = [own["percent"] for own in known.values()]
     first = min(starts)
-    n_bins = (
-        max(start + len(one["percent"]) for start, one in zip(starts, own, strict=True)) - first
-    )
-    percent = np.zeros((len(own), n_bins))
-    for row, start, one in zip(percent, starts, own, strict=True):
-        row[start - first :][: len(one["percent"])] = one["percent"]
-    edges = HISTOGRAM_BIN * (first + np.arange(n_bins + 1))
-    return ForceHistograms(variants, pantographs, edges, percent)
+    last = max(start + len(share) for start, share in zip(starts, shares, strict=True))
+    percent = np.zeros((len(known), last - first))
+    for row, start, share in zip(percent, starts, shares, strict=True):
+        row[start - first :][: len(share)] = share
+    rows = pd.MultiIndex.from_tuples(known, names=("variant", "pantograph"))
+    return pd.DataFrame(percent, rows, HISTOGRAM_BIN * np.arange(first, last))
 
 
 def files(ended: Sequence[Ended]) -> dict[str, Content]:
@@ -66,23 +48,22 @@ def files(ended: Sequence[Ended]) -> dict[str, Content]:
     found = force_histograms(ended)
     if found is None:
         return {}
-    heads = ["variant", "pantograph", *(f"from_{edge:g}_N" for edge in found.edges[:-1])]
-    names = zip(found.variants, found.pantographs, strict=True)
-    rows: Any = ([*own, *row.tolist()] for own, row in zip(names, found.percent, strict=True))
-    return {TABLE: csv_text(heads, rows), PICTURE: lambda: draw(found)}
+    heads = [*found.index.names, *(f"from_{edge:g}_N" for edge in found.columns)]
+    rows = ([*own, *row] for own, row in zip(found.index, found.to_numpy().tolist(), strict=True))
+    return {TABLE: file_table(heads, rows), PICTURE: lambda: draw(found)}
 
 
 @figures.own_style()
-def draw(found: ForceHistograms) -> Figure:
+def draw(found: pd.DataFrame) -> Figure:
     """The mean share of time in each bin, and between which shares 90 % of the variants lie."""
     figure = figures.new_figure(3.4)
     axes = figure.subplots()
-    names = np.array(found.pantographs)
-    for number, name in enumerate(dict.fromkeys(found.pantographs)):
-        own, colour = found.percent[names == name], figures.colour(number)
+    edges = [*found.columns, found.columns[-1] + HISTOGRAM_BIN]
+    for number, (name, own) in enumerate(found.groupby("pantograph", sort=False)):
+        colour = figures.colour(number)
         low, high = np.quantile(own, (_LOW, _HIGH), axis=0)
-        axes.stairs(high, found.edges, baseline=low, fill=True, color=colour, alpha=0.25)
-        axes.stairs(own.mean(axis=0), found.edges, color=colour, label=name)
+        axes.stairs(high, edges, baseline=low, fill=True, color=colour, alpha=0.25)
+        axes.stairs(own.mean(axis=0), edges, color=colour, label=name)
     figures.tidy(axes, "filtered contact force, 0-20 Hz [N]", "share of time [%]")
     axes.set_title("line: mean of all variants, band: 5 to 95 % of them", loc="left")
     figures.legend_above(axes)

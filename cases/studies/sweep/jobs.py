@@ -40,6 +40,13 @@ OF_LINE = (
     Column("min_dropper_force_N", meaning="minimum dropper force [N]"),
 )
 STATISTICS = {column.name: column for column in (*OF_PANTOGRAPH, *OF_LINE)}
+# Tables of a summary that hold statistics of the line, and their keys there.
+_IN_SUMMARY = {
+    "max_uplift_mm": ("supports", "max_uplift_mm"),
+    "n_slackened": ("droppers", "n_slackened"),
+    "max_dropper_force_N": ("droppers", "max_force_N"),
+    "min_dropper_force_N": ("droppers", "min_force_N"),
+}
 # Histories that an ensemble can keep of each pantograph, with unit and meaning.
 HISTORIES = {
     "contact_force": ("N", "contact force, >= 0 in compression"),
@@ -54,6 +61,20 @@ def check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> No
     for name in names:
         if name not in known:
             raise InputError(f"{shown(name)[1:-1]} is no {what}; {meant(name, list(known))}")
+
+
+def statistics_of(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """``pantograph`` and ``STATISTICS`` of each pantograph of a run, those of the line with each.
+
+    What is not known is None. A run without a ``summary`` has a row without figures.
+    """
+    line = {name: summary.get(table, {}).get(key) for name, (table, key) in _IN_SUMMARY.items()}
+    return [
+        {"pantograph": one.get("name", "")}
+        | {column.name: one.get(column.name) for column in OF_PANTOGRAPH}
+        | line
+        for one in summary.get("pantographs", [{}])
+    ]
 
 
 @dataclass(frozen=True)

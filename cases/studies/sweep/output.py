@@ -15,7 +15,7 @@ from catenary.cases.scene.input.toml_input import REMOVED, parse_assignment
 from catenary.cases.scene.keys.keys import ANY
 from catenary.cases.scene.keys.units import unit_of, without_unit
 from catenary.cases.studies.sweep import force_histograms
-from catenary.cases.studies.sweep.jobs import OF_LINE, OF_PANTOGRAPH, STATISTICS, Ended
+from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, statistics_of
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.cases.terminal.lists import Key, keys_of_a_scene
 from catenary.cases.terminal.terminal_text import labelled
@@ -62,14 +62,7 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         verdict = "passed" if head["passed"] else "not judged"
         head["accepted"] = f"FAILED {', '.join(failed)}" if failed else verdict
         head["wall_s"] = one.wall
-        droppers = one.summary.get("droppers", {})
-        values = [one.summary.get("supports", {}).get("max_uplift_mm")]
-        values += [droppers.get(name) for name in ("n_slackened", "max_force_N", "min_force_N")]
-        of_line = {column.name: value for column, value in zip(OF_LINE, values, strict=True)}
-        for pantograph in one.summary.get("pantographs", [{}]):
-            row: dict[str, Any] = {**head, "pantograph": pantograph.get("name", "")}
-            row |= {column.name: pantograph.get(column.name) for column in OF_PANTOGRAPH}
-            rows.append(row | of_line)
+        rows += [head | figures for figures in statistics_of(one.summary)]
     columns = [
         Column("variant", "variant"),
         *map(Column, keys),

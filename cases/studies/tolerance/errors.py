@@ -113,15 +113,11 @@ def _group(table: ErrorKind, scene: Scene, where: str) -> Group:
     low, high = low - _SPANS_BESIDE * span, high + _SPANS_BESIDE * span
     irregular = tables.get("irregularities", {})
     if isinstance(table, DropperErrors):
-        places = [
-            (s + 1, d + 1)
-            for s in range(line.n_spans)
-            for d in range(line.droppers_of_span(s).size)
-        ]
-        if not places:
+        droppers = line.numbered_droppers
+        if not droppers:
             raise InputError(f"{where} are of dropper lengths, but the line has no droppers")
+        places, x = [*droppers], np.array([*droppers.values()])
         names = [f"span {s}, dropper {d}" for s, d in places]
-        x = np.concatenate([line.droppers_of_span(s) for s in range(line.n_spans)])
         given = irregular.get("dropper_lengths", {}).get("by_dropper", [])
         return Group(table, names, (x > low) & (x < high), "mm", places, given)
     if isinstance(table, HeightErrors):

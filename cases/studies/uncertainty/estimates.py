@@ -1,4 +1,7 @@
-"""Estimates from samples with confidence bounds: mean, deviation, quantiles, probabilities."""
+"""Estimates from samples with confidence bounds: mean, deviation, quantiles, probabilities.
+
+Samples are independent values, shape (n,); a mean and a deviation take two of them.
+"""
 
 from __future__ import annotations
 
@@ -25,12 +28,7 @@ class Bounded(NamedTuple):
 
 
 def student(x: np.ndarray) -> Bounded:
-    """Mean with the bounds of Student's distribution.
-
-    Parameters
-    ----------
-    x : independent values, shape (n,), n >= 2
-    """
+    """Mean with the bounds of Student's distribution."""
     from scipy import stats
 
     n, value = len(x), float(np.mean(x))
@@ -43,10 +41,6 @@ def mean(x: np.ndarray) -> Bounded:
 
     Of fewer than ``_FEWEST_RESAMPLED`` values, or more than ``_MOST_RESAMPLED``, by Student's
     distribution.
-
-    Parameters
-    ----------
-    x : independent values, shape (n,), n >= 2
     """
     if np.ptp(x) == 0.0 or not _FEWEST_RESAMPLED <= len(x) <= _MOST_RESAMPLED:
         return student(x)
@@ -59,10 +53,6 @@ def deviation(x: np.ndarray) -> Bounded:
     Up to ``_MOST_RESAMPLED`` values by the bootstrap (BCa, Efron 1987); of more by the normal
     limit, var(s) = s^2 (kurtosis - 1)/(4 n) (Cramer 1946, sec. 27.7). Fewer than
     ``_FEWEST_RESAMPLED`` values have none.
-
-    Parameters
-    ----------
-    x : independent values, shape (n,), n >= 2
     """
     from scipy import stats
 
@@ -100,12 +90,8 @@ def quantile(x: np.ndarray, probability: float) -> Bounded:
 
     The number of values below the quantile is binomial, so that between the values of ranks l and
     u lies the quantile with at least the wanted confidence (David and Nagaraja 2003, sec. 7.1). A
-    bound is NaN if there are too few values for it.
-
-    Parameters
-    ----------
-    x : independent values, shape (n,)
-    probability : of the quantile, in (0, 1)
+    bound is NaN if there are too few values for it. The ``probability`` of the quantile is in
+    (0, 1).
     """
     from scipy import stats
 

@@ -77,7 +77,10 @@ def evaluate(table: RunTable) -> Uncertainty:
     method, sensitivity, notes = indices(table)
     if n_done < len(runs):
         broken = counted(len(runs) - n_done, "run")
-        notes.insert(0, f"{broken} of {len(runs)} did not end; estimates are of the others")
+        others = "; estimates are of the others" if statistics else ""
+        notes.insert(0, f"{broken} of {len(runs)} did not end{others}")
+    if not statistics:
+        notes.insert(0, "there are no estimates, which take figures of at least two runs")
     probabilities = failing(independent)
     return Uncertainty(
         len(runs), n_done, statistics, quantiles, probabilities, method, sensitivity,

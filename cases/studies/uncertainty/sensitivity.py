@@ -110,8 +110,12 @@ def ranked_inputs(table: RunTable) -> list[str]:
 
 def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
     keys = ranked_inputs(table)
-    without = [name for name in table.inputs if name not in keys]
+    others = [name for name in table.inputs if name not in keys]
+    alike = [name for name in others if table.done[name].map(str).nunique() < 2]
+    without = [name for name in others if name not in alike]
     notes: list[str] = []
+    if alike:
+        notes.append(f"{', '.join(alike)} without an index: no two runs differ in it")
     if without:
         notes.append(
             f"{', '.join(without)} without an index: seeds, fields and choices have one with "

@@ -62,22 +62,9 @@ class Bench(NamedTuple):
     ends: bool = False
 
 
-class Measured(NamedTuple):
-    """Shares of waves at f frequencies, as `scattering.scattered` returns them.
-
-    Attributes
-    ----------
-    back, onward : (f, n, n) complex; onward is zero beyond an end
-    omega : (f,) angular frequencies of the discrete motion, (2 / dt) tan(w dt / 2) for the angular
-        frequency w and steps of average acceleration [1/s]
-    """
-
-    back: np.ndarray
-    onward: np.ndarray
-    omega: np.ndarray
-
-
-def measured(bench: Bench, problem: Problem, frequency: np.ndarray) -> Measured:
+def measured(
+    bench: Bench, problem: Problem, frequency: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run a pulse on each wire of a bench and measure reflected and transmitted waves. Serial.
 
     On each wire the incoming and the reflected pulse are measured before the obstacle, the
@@ -89,6 +76,13 @@ def measured(bench: Bench, problem: Problem, frequency: np.ndarray) -> Measured:
     bench : wires and obstacle
     problem : problem whose effects give masses and springs of the obstacle
     frequency : (f,) > 0 [Hz]
+
+    Returns
+    -------
+    back, onward : (f, n, n) complex, as `scattering.scattered` returns them; onward is zero beyond
+        an end
+    omega : (f,) angular frequencies of the discrete motion, (2 / dt) tan(w dt / 2) for the angular
+        frequency w and steps of average acceleration [1/s]
     """
     model = _model(bench, problem)
     n, f = len(bench.wires), frequency.size
@@ -109,7 +103,7 @@ def measured(bench: Bench, problem: Problem, frequency: np.ndarray) -> Measured:
             if not bench.ends:
                 late = np.exp(1j * (delays[struck] + beyond[other]))
                 onward[:, other, struck] = change @ behind[other] / came * late
-    return Measured(back, onward, seen)
+    return back, onward, seen
 
 
 def _model(bench: Bench, problem: Problem) -> Model:
@@ -317,9 +311,8 @@ def _alone(name: str, bench: Bench, stiffness: float, mass: float) -> Obstacle:
 def result_of(obstacle: Obstacle, problem: Problem, frequency: np.ndarray = FREQUENCIES) -> Result:
     """Measure the shares that an obstacle sends back and onward at each ``frequency`` (n,) [Hz], on
     the line of a ``problem``, and put theory beside them. Serial."""
-    bench = obstacle.bench
-    found = measured(bench, problem, frequency)
-    omega, wires = found.omega, bench.wires
+    bench, wires = obstacle.bench, obstacle.bench.wires
+    seen_back, seen_onward, omega = measured(bench, problem, frequency)
     if bench.ends:
         # Held, free to turn: the wave comes back turned over.
         back, onward = -np.ones((omega.size, 1, 1)), np.zeros((omega.size, 1, 1))
@@ -331,7 +324,7 @@ def result_of(obstacle: Obstacle, problem: Problem, frequency: np.ndarray = FREQ
         back, onward = scattered(wires, omega, obstacle.stiffness - squares * obstacle.mass)
     return Result(
         obstacle.name, tuple(wire.name for wire in wires), frequency,
-        np.stack([found.back, back]), np.stack([found.onward, onward]),
+        np.stack([seen_back, back]), np.stack([seen_onward, onward]),
     )  # fmt: skip
 
 

@@ -209,12 +209,8 @@ class EnergySeen:
         """The energy without that at the ends of a window, beyond which a line rests.
 
         It is held there where it was when the window went on, and snapshots show it at rest: the
-        step between has no energy of waves.
-
-        Parameters
-        ----------
-        moving : ndarray, shape (t, 2)
-            From and to of what moves at each time [m].
+        step between has no energy of waves. What is ``moving`` at each time, (t, 2), has a begin
+        and an end [m].
         """
         left, right = self.x - 0.5 * STRETCH, self.x + 0.5 * STRETCH
         begin, end = moving[:, :1], moving[:, 1:]
