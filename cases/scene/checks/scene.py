@@ -221,11 +221,11 @@ def _running(scene: Scene, line: LineData) -> Iterator[Fault]:
     given = scene.train.end_m
     if given is not None and given > last + _TINY:
         yield scene.refused("train.end_m", f"it must lie inside the line: {inside}")
-    if end <= start:
-        if given is None:
-            yield scene.refused("train.start_m", f"it must lie before the end at {end:g} m")
+    if end <= start and given is None:
+        yield scene.refused("train.start_m", f"it must lie before the end at {end:g} m")
+    elif end <= start:
         yield scene.refused("train.end_m", f"it must be greater than train.start_m ({start:g} m)")
-    if end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
+    elif end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
         yield scene.refused("numerics.dt_s", "the run would have no step at all")
 
 
