@@ -337,7 +337,12 @@ def begin(
         on_root,
         set_up_logging,
     )
-    from catenary.cases.process.petsc_options import as_arguments, idle_options, start_petsc
+    from catenary.cases.process.petsc_options import (
+        as_arguments,
+        idle_options,
+        refuse_unwritable,
+        start_petsc,
+    )
 
     # A process of its own is refused before MPI has started.
     read_before = None if launched_by_mpirun() else read()
@@ -349,6 +354,7 @@ def begin(
     what, options = read_before or on_root(comm, read, takes_long=True)
     table = scene_of(what).petsc.given()
     arguments = as_arguments(table, options)
+    on_root(comm, lambda: refuse_unwritable(options))
     start_petsc(arguments)
 
     def warn() -> None:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import itertools
+import re
 import shlex
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.keys.keys import nearest
+from catenary.postproc.files.disk_errors import reason
 
 # Options that PETSc looks up when the process ends, after `idle_options` was called.
 _LOOKED_UP_LAST = frozenset(
@@ -61,6 +65,34 @@ def as_arguments(table: Mapping[str, Any], command_line: Sequence[str] = ()) -> 
         elif value is not True:
             words.append(str(value))
     return words + list(command_line)
+
+
+def refuse_unwritable(arguments: Sequence[str]) -> None:
+    """Refuse output of PETSc that it would find impossible when the run is made. Not collective.
+
+    Its viewers are named KIND:FILE:FORMAT, each of which may be left out.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written, or if the log is to be of another kind than text.
+    """
+    for name, value in itertools.pairwise(arguments):
+        kind, colon, rest = value.partition(":")
+        if not name.startswith("-") or value.startswith("-"):
+            continue
+        if name == "-log_view" and kind not in ("", "ascii"):
+            raise InputError(f"-log_view {shown(value)[1:-1]} names no file; write -log_view :FILE")
+        path = Path(rest.partition(":")[0])
+        if not colon or path == Path() or not re.search("_(view|monitor)", name):
+            continue
+        is_new = not path.exists()
+        try:
+            path.open("ab").close()
+        except OSError as error:
+            raise InputError(f"{name} cannot write {path}: {reason(error)}") from error
+        if is_new:
+            path.unlink()
 
 
 def start_petsc(arguments: Sequence[str]) -> None:
