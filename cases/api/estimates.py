@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError
 from catenary.callers import path_of
+from catenary.cases.scene.input.faults import shown
 from catenary.scenes import plain_value
 
 if TYPE_CHECKING:
@@ -129,11 +130,13 @@ def uncertainty(
     where = "the table"
     if isinstance(table, str | Path):
         runs, where = read_run_table(path_of(table, "table")), str(table)
-    else:
+    elif isinstance(table, pd.DataFrame | Mapping):
         try:
             runs = run_table(pd.DataFrame(table))
         except ValueError as error:
             raise InputError(f"the table is no table of columns of one length: {error}") from error
+    else:
+        raise InputError(f"table is {shown(table)}; it must be a table, or a file or folder of one")
     if sample is not None:
         runs = run_table(runs.frame, sampling_like(sample)[0], where)
     found = evaluate(runs)

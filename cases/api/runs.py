@@ -21,6 +21,7 @@ from catenary.callers import (
     temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
+from catenary.cases.result_folder.output_folder import run_folder
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def restart(
     Parameters
     ----------
     folder : str or Path
-        The folder of the run, whose last state it goes on from.
+        The folder of the run, whose last state it goes on from, or its ``run.h5``.
     until_m : float, optional
         Where the leading pantograph is to stop [m], if that is later than the run says.
     evaluate : sequence of two floats, optional
@@ -137,7 +138,7 @@ def restart(
     >>> longer.outcome, bool(longer.force.position.max() > end + 9.0)
     ('done', True)
     """
-    own, comm, stretch = path_of(folder, "folder"), communicator(comm), None
+    own, comm, stretch = run_folder(path_of(folder, "folder")), communicator(comm), None
     until = None if until_m is None else number_of(until_m, "until_m")
     if evaluate is not None:
         places: Any = evaluate if np.ndim(evaluate) else [evaluate]

@@ -18,6 +18,7 @@ import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
 from catenary.cases.cli.varied_words import Verb
+from catenary.cases.result_folder.output_folder import run_folder
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -68,9 +69,7 @@ def verb(name: str, *, help: str, epilog: str, serial: bool = False) -> Callable
 serial_verb = partial(verb, serial=True)
 RunFolder = Annotated[
     Path,
-    typer.Argument(
-        parser=console.run_folder, metavar="FOLDER", help="Folder of a run, or its run.h5."
-    ),
+    typer.Argument(parser=run_folder, metavar="FOLDER", help="Folder of a run, or its run.h5."),
 ]
 Case = Annotated[
     str,

@@ -83,7 +83,7 @@ class Distances(NamedTuple):
             )
         step = option("--step", "step")
         if not 0.0 < self.step < inf:
-            raise InputError(f"{step} {self.step:g} is not possible: it is above 0 m")
+            raise InputError(f"{step} {self.step:g} is not possible: it is finite and above 0 m")
         length = self.farthest - self.nearest
         if length / self.step > MOST:
             raise InputError(f"{step} {self.step:g} makes more than {MOST} distances")
