@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,13 +81,12 @@ def run(
     True
     """
     given, tables, comm = folder_of(out), checked(scene), communicator(comm)
-    with _set_up(tables, progress, comm) as options:
-        if given is not None:
-            made = run_into(given, tables, comm, options, force=force, only_summary=not report)
-            return _returned(made, comm)
-        with temporary_folder(comm, "run") as folder:
-            made = run_into(folder, tables, comm, options, force=force, only_summary=True)
-            return _returned(made, comm, in_memory=True)
+    in_memory = given is None
+    with _set_up(tables, progress, comm) as options, ExitStack() as stack:
+        folder = given or stack.enter_context(temporary_folder(comm, "run"))
+        only_summary = in_memory or not report
+        made = run_into(folder, tables, comm, options, force=force, only_summary=only_summary)
+        return _returned(made, comm, in_memory)
 
 
 def restart(
@@ -154,54 +153,17 @@ def restart(
 
 
 def run_into(
-    folder: Path,
-    scene: CheckedScene,
-    comm: Any,
-    petsc_options: Sequence[str],
-    *,
-    force: bool = False,
-    only_summary: bool = False,
-    on_closed: Callable[[str], None] = lambda outcome: None,
-    ready: Callable[[], None] = lambda: None,
+    folder: Path, scene: CheckedScene, comm: Any, petsc_options: Sequence[str], **how: Any
 ) -> Run:
     """A run into a folder, however it ends, of which no file is open. Collective.
 
-    Parameters
-    ----------
-    folder, scene, comm, force, only_summary, on_closed, ready
-        As of ``cases.run.runner.run_case``.
-    petsc_options : sequence of str
-        Options that PETSc was started with, for the record.
-
-    Returns
-    -------
-    Run
-        On every process. Its ``outcome`` says how the march ended.
-
-    Raises
-    ------
-    InputError, RunBroken
-        As ``run_case``.
+    ``petsc_options`` are those that PETSc was started with; ``how`` and errors are those of
+    ``cases.run.runner.run_case``. The ``outcome`` of the run says how the march ended.
     """
-    from catenary.cases.run.runner import on_as_many, run_case
-
-    ended = on_as_many(
-        scene,
-        comm,
-        lambda ranks: run_case(
-            scene,
-            folder,
-            ranks,
-            force=force,
-            petsc_options=petsc_options,
-            on_closed=on_closed,
-            ready=ready,
-            only_summary=only_summary,
-        ),
-    )
+    from catenary.cases.run.runner import run_case
     from catenary.results import Run
 
-    return Run(None, folder, ended)
+    return Run(None, folder, run_case(scene, folder, comm, petsc_options=petsc_options, **how))
 
 
 def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None) -> CheckedScene:
@@ -237,46 +199,16 @@ def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None)
 
 
 def go_on(
-    folder: Path,
-    scene: CheckedScene,
-    comm: Any,
-    petsc_options: Sequence[str],
-    *,
-    force: bool = False,
-    extends: bool = False,
-    only_summary: bool = False,
-    on_closed: Callable[[str], None] = lambda outcome: None,
+    folder: Path, scene: CheckedScene, comm: Any, petsc_options: Sequence[str], **how: Any
 ) -> Run:
-    """A run that goes on, as of ``run_into``. Collective.
+    """A run that goes on, as of ``run_into``, with what ``scene_to_continue`` gave. Collective.
 
-    Parameters
-    ----------
-    folder, comm, force, extends, only_summary, on_closed
-        As of ``cases.run.runner.restart_case``.
-    scene : Scene
-        What ``scene_to_continue`` gave.
-    petsc_options : sequence of str
-        As of ``run_into``.
+    ``how`` and errors are those of ``cases.run.runner.restart_case``.
     """
-    from catenary.cases.run.runner import on_as_many, restart_case
-
-    ended = on_as_many(
-        scene,
-        comm,
-        lambda ranks: restart_case(
-            scene,
-            folder,
-            ranks,
-            petsc_options=petsc_options,
-            on_closed=on_closed,
-            force=force,
-            extends=extends,
-            only_summary=only_summary,
-        ),
-    )
+    from catenary.cases.run.runner import restart_case
     from catenary.results import Run
 
-    return Run(None, folder, ended)
+    return Run(None, folder, restart_case(scene, folder, comm, petsc_options=petsc_options, **how))
 
 
 @contextmanager

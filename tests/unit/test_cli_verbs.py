@@ -68,7 +68,6 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
 
     module = types.ModuleType("catenary.cases.run.runner")
     module.run_case = run_case  # type: ignore[attr-defined]
-    module.on_as_many = lambda scene, comm, run: run(comm)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "catenary.cases.run.runner", module)
     monkeypatch.setattr("catenary.cases.process.petsc_options.start_petsc", lambda arguments: None)
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
