@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from catenary.base.errors import InputError
 from catenary.callers import path_of
 from catenary.cases.scene.input.faults import shown
-from catenary.scenes import plain_value
+from catenary.scenes import tables_or_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -163,16 +163,10 @@ def write_uncertainty(found: Uncertainty, folder: Path) -> list[Path]:
 
 
 def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable, str]:
-    """The checked tables of a sampling, and where they were written, for sentences.
-
-    Parameters
-    ----------
-    sample : mapping, str or Path
-        The tables as nested dictionaries, or the file.
-    """
+    """The checked tables of a sampling, and where they were written, for sentences."""
     from catenary.cases.studies.sampling.tables import read_sampling, sampling_of
 
-    if isinstance(sample, Mapping):
-        where = "the table given as sample"
-        return sampling_of(plain_value(sample, "sample"), where), where
-    return read_sampling(path_of(sample, "sample", "a file, or its tables")), str(sample)
+    given, where = tables_or_file(sample, "sample"), "the table given as sample"
+    if isinstance(given, Path):
+        return read_sampling(given), str(sample)
+    return sampling_of(given, where), where

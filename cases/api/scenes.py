@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError
+from catenary.callers import path_of
 from catenary.cases.scene.input.case_files import titles
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import DEEPEST
@@ -235,6 +236,17 @@ def _values(
             yield from _values(value, where, f"{key}.")
         else:
             yield key, REMOVED if value is None else plain_value(value, f"{key} {where}"), where
+
+
+def tables_or_file(given: Any, argument: str) -> dict[str, Any] | Path:
+    """The tables of an argument as TOML would give them, or the file that has them.
+
+    Raises InputError if it is neither.
+    """
+    if isinstance(given, Mapping):
+        tables: dict[str, Any] = plain_value(given, argument)
+        return tables
+    return path_of(given, argument, "a file, or its tables")
 
 
 def plain_value(value: Any, where: str, depth: int = 0) -> Any:
