@@ -100,7 +100,7 @@ ASSIGNMENTS = {
     "wind of no speed": (["wind.height_m=6"], "wind.speed_m_per_s (mean speed"),
     "two strengths of gusts": (
         ["wind={speed_m_per_s=20, gusts={turbulence_intensity=0.2, friction_velocity_m_per_s=2}}"],
-        "must have turbulence_intensity or friction_velocity_m_per_s, but both are given",
+        "takes turbulence_intensity or friction_velocity_m_per_s, but both are given",
     ),
     "no frequencies": (
         ["wind={speed_m_per_s=20, gusts={lowest_hz=0.5, highest_hz=0.2}}"],
