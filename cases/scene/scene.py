@@ -122,6 +122,13 @@ class Scene(Table):
         """The fault of a key; ``sentence`` continues after the key's name and place."""
         return Fault(key, f"{key} {self._origin.of(key)} {sentence}")
 
+    def missing(self, key: str, meaning: str, why: str = "", *, of: str = "") -> Fault:
+        """The fault of a key that is not there; ``of`` is the table that is, ``why`` a sentence's
+        end."""
+        end = f": {why}" if why else ""
+        named = f"{key} ({meaning})" if meaning else key
+        return Fault(key, f"{named} is missing {self._origin.of(of or key)}{end}")
+
     def needs_effect(self, key: str, effect: str) -> Fault:
         """The fault of a key that acts only with an effect that is off by default."""
         why = f"it acts only with effects.{effect} = true; write that, or false to leave it out"

@@ -206,12 +206,8 @@ def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     name = "dropper_lengths"
     given = scene.irregularities.dropper_lengths is not None
     if given and scene.effects.get(name) is not False and not make_line(line).droppers:
-        key = f"irregularities.{name}"
-        yield scene.fault(
-            key,
-            f"changes nothing: the line has no droppers; leave it "
-            f"out, or write effects.{name} = false",
-        )
+        why = "changes nothing: the line has no droppers; leave it out, or write"
+        yield scene.fault(f"irregularities.{name}", f"{why} effects.{name} = false")
 
 
 def _sagging(scene: Scene) -> Iterator[Fault]:

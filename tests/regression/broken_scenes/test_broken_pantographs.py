@@ -48,7 +48,7 @@ ASSIGNMENTS = {
         f'{KIND}.joints.slide.i is "must" on the command line (--set); did you mean mast?',
     ),
     "unknown body of a force": ([f"{KIND}.forces.brake.j=nothing"], "one of mast, head, space"),
-    "head is arm": ([f"{KIND}.head=mast"], "as the arm is"),
+    "head is arm": ([f"{KIND}.head=mast"], "the arm is this body too; they are two"),
     "joint of one body": ([f"{KIND}.joints.slide.i=head"], 'has "head" on both sides'),
     "uplift twice": (
         [f"{KIND}.aerodynamics={{uplift_polynomial=[1], uplift_by_speed=[[0, 0], [300, 80]]}}"],
