@@ -15,6 +15,7 @@ from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
+from catenary.postproc.files.disk import unwritten
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,6 +78,8 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     ------
     InputError
         If the file must not be written, or the line has no equilibrium.
+    RunBroken
+        If the disk refuses.
     """
     new_file(path, DRAWN, force)
     from catenary.cases.scene.problem import problem_of
@@ -84,7 +87,10 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
 
     problem, mesh = problem_of(scene), mesh_of(scene)
     figure, stretch = line_figure(scene, problem, mesh, find_form(problem, mesh)[1])
-    figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
+    try:
+        figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
+    except OSError as error:
+        raise unwritten(path, error) from error
     return stretch
 
 

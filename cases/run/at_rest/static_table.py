@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.base.errors import InputError, RunBroken
+from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.run.at_rest.temperatures import temperatures
 from catenary.cases.run.describe.arrivals import arrival_facts
@@ -25,6 +25,7 @@ from catenary.meshgen.wires import End
 from catenary.postproc.channels.header import line_datasets, static_datasets
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.csv_text import csv_text
+from catenary.postproc.files.disk import unwritten
 from catenary.postproc.read.registration import Registration
 from catenary.solver.effects.all_effects import with_defects
 from catenary.solver.model.model import Model
@@ -181,4 +182,4 @@ def write_static(path: Path, table: Mapping[str, Any], registration: bool = Fals
             )
             stream.write(csv_text(_DROPPER_HEADS, rows))
     except OSError as error:
-        raise RunBroken(f"{path} could not be written: {error.strerror}") from error
+        raise unwritten(path, error) from error

@@ -11,6 +11,7 @@ from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
+from catenary.postproc.files.disk import unwritten
 from catenary.solver.statics.tension_along import LineAtTemperature, WireAtRest, over_temperatures
 
 # Limits of the change of tension: share, of what, and who states it.
@@ -118,6 +119,8 @@ def temperatures(scene: Scene, differences: Sequence[float], picture: Path | Non
     ------
     InputError
         If the scene does not let its wires move along the track.
+    RunBroken
+        If the picture cannot be written.
     """
     switches = scene.switches()
     for name in _EFFECTS:
@@ -132,5 +135,8 @@ def temperatures(scene: Scene, differences: Sequence[float], picture: Path | Non
         # Matplotlib takes long to import.
         from catenary.postproc.report.pictures.line_pictures import draw_temperatures
 
-        draw_temperatures(rests, picture)
+        try:
+            draw_temperatures(rests, picture)
+        except OSError as error:
+            raise unwritten(picture, error) from error
     return temperature_text(rests, problem.along.tensioner.ratio)
