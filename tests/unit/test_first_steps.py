@@ -257,6 +257,17 @@ def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
+def test_what_runs_do_without_is_not_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Open MPI starts a daemon out of PATH in processes of others; runs start without it."""
+    monkeypatch.setenv("PATH", "/nonexistent")
+    solved = installation._tried("PETSc", installation._PETSC, "mend it", needed=True)
+    assert solved.state == OK and "solves a small system" in solved.facts
+    mpi = installation._mpi()
+    assert mpi.state == MISSING and mpi.facts == "there is no mpirun in PATH"
+    assert not mpi.prevents_runs
+
+
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("program", "facts", "state"),
     [
@@ -264,7 +275,7 @@ def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:
         ("raise ValueError('it is old')", "ValueError: it is old", BROKEN),
         ("import os; os.kill(os.getpid(), 11)", "ended by signal 11", BROKEN),
         ("import time; time.sleep(60)", "no answer within 1 s", BROKEN),
-        ("print('7.1')", "7.1", OK),
+        ("print('7.1', '\\n----')", "7.1", OK),
     ],
 )
 def test_a_part_that_fails_is_a_finding(
@@ -279,7 +290,7 @@ def test_a_part_that_fails_is_a_finding(
 
 
 def test_without_mpirun_one_rank_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(installation, "_answer", lambda command: (0, "ranks 1 An MPI"))
+    monkeypatch.setattr(installation, "_answer", lambda command, **how: (0, "ranks 1 An MPI"))
     monkeypatch.setenv("PATH", str(tmp_path))
     found = installation._mpi()
     assert found.state == MISSING and not found.prevents_runs
