@@ -161,9 +161,11 @@ def run_into(
     ``cases.run.runner.run_case``. The ``outcome`` of the run says how the march ended.
     """
     from catenary.cases.run.runner import run_case
-    from catenary.results import Run
 
-    return Run(None, folder, run_case(scene, folder, comm, petsc_options=petsc_options, **how))
+    ended = run_case(scene, folder, comm, petsc_options=petsc_options, **how)
+    from catenary.results import Run  # reads results, which no march needs
+
+    return Run(None, folder, ended)
 
 
 def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None) -> CheckedScene:
@@ -206,9 +208,11 @@ def go_on(
     ``how`` and errors are those of ``cases.run.runner.restart_case``.
     """
     from catenary.cases.run.runner import restart_case
-    from catenary.results import Run
 
-    return Run(None, folder, restart_case(scene, folder, comm, petsc_options=petsc_options, **how))
+    ended = restart_case(scene, folder, comm, petsc_options=petsc_options, **how)
+    from catenary.results import Run  # reads results, which no march needs
+
+    return Run(None, folder, ended)
 
 
 @contextmanager

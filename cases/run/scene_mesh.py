@@ -15,7 +15,6 @@ from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
-from catenary.postproc.files.disk import unwritten
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,6 +89,8 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     try:
         figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
     except OSError as error:
+        from catenary.postproc.files.disk import unwritten  # loads HDF5
+
         raise unwritten(path, error) from error
     return stretch
 

@@ -25,7 +25,6 @@ from catenary.meshgen.wires import End
 from catenary.postproc.channels.header import line_datasets, static_datasets
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.csv_text import csv_text
-from catenary.postproc.files.disk import unwritten
 from catenary.postproc.read.registration import Registration
 from catenary.solver.effects.all_effects import with_defects
 from catenary.solver.model.model import Model
@@ -182,4 +181,6 @@ def write_static(path: Path, table: Mapping[str, Any], registration: bool = Fals
             )
             stream.write(csv_text(_DROPPER_HEADS, rows))
     except OSError as error:
+        from catenary.postproc.files.disk import unwritten  # loads HDF5
+
         raise unwritten(path, error) from error

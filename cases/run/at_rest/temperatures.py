@@ -11,7 +11,6 @@ from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.postproc.files.disk import unwritten
 from catenary.solver.statics.tension_along import LineAtTemperature, WireAtRest, over_temperatures
 
 # Limits of the change of tension: share, of what, and who states it.
@@ -138,5 +137,7 @@ def temperatures(scene: Scene, differences: Sequence[float], picture: Path | Non
         try:
             draw_temperatures(rests, picture)
         except OSError as error:
+            from catenary.postproc.files.disk import unwritten  # loads HDF5
+
             raise unwritten(picture, error) from error
     return temperature_text(rests, problem.along.tensioner.ratio)
