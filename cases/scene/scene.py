@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import Field, PrivateAttr
 
 from catenary.cases.scene.input.faults import Fault, Origin
+from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Defect, IrregularitiesTable
@@ -108,15 +109,9 @@ class Scene(Table):
 
     def _at(self, key: str) -> object:
         """The value of a dotted key, which exists; of an effect whether it is on."""
-        here: Any = self
         if key.startswith("effects."):
             return self.switches()[key.removeprefix("effects.")]
-        for part in key.split("."):
-            if isinstance(here, Table):
-                here = getattr(here, part)
-            else:
-                here = here[int(part) if isinstance(here, list) else part]
-        return here
+        return value_at(self.model_dump(), key)
 
     def fault(self, key: str, sentence: str) -> Fault:
         """The fault of a key; ``sentence`` continues after the key's name and place."""
