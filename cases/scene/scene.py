@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Iterator
+from functools import cached_property
 from typing import Any
 
 from pydantic import Field, PrivateAttr
@@ -18,6 +19,7 @@ from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Defect, IrregularitiesTable
 from catenary.cases.scene.line.line import LineTable
+from catenary.cases.scene.line.line_data import line_data
 from catenary.cases.scene.run.case import CaseTable, EvaluationTable, OutputTable
 from catenary.cases.scene.run.contact import ContactTable
 from catenary.cases.scene.run.incidents import Incident
@@ -27,6 +29,7 @@ from catenary.cases.scene.run.wind import WindTable
 from catenary.cases.scene.train.mechanism import Name
 from catenary.cases.scene.train.pantograph import PantographTable
 from catenary.cases.scene.train.train import TrainTable, VehicleTable
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.effects import all_effects as effect_registry
 from catenary.solver.effects.effect import Limit
 
@@ -79,6 +82,17 @@ class Scene(Table):
     def origin(self) -> Origin:
         """Origin of the keys, for sentences about them."""
         return self._origin
+
+    @cached_property
+    def line_data(self) -> LineData:
+        """The line as topologies take it, made once: all checks look at it.
+
+        Raises
+        ------
+        InputError
+            If the droppers are not declared for one of the span lengths.
+        """
+        return line_data(self.line, self._origin)
 
     def refused(self, key: str, why: str, *, value: object = None) -> Fault:
         """The fault of a key: its value, where it was written, and why it cannot be.

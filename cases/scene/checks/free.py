@@ -25,7 +25,6 @@ from catenary.cases.scene.line.line_data import (
     span_lengths,
     stretches_of,
 )
-from catenary.cases.scene.problem import line_data_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import SAME_CUT, Cuts, divisions_of
 from catenary.meshgen.hardware import Clamps
@@ -361,7 +360,7 @@ def free_counts(scene: Scene) -> tuple[int, dict[str, int]]:
     InputError
         If droppers are not declared for one of the span lengths.
     """
-    line = line_data_of(scene)
+    line = scene.line_data
     assert line.wires is not None and line.links is not None
     x = places_of(line)
     cuts = Cuts(x, np.isin(x, line.support_positions), ())

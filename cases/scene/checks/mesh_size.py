@@ -16,7 +16,7 @@ from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.free import FreeDroppersTable
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import free_wires, overlaps_of, span_lengths
-from catenary.cases.scene.problem import line_data_of, line_of
+from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import divisions_of, find_cuts
 from catenary.meshgen.wires import Wire
@@ -123,7 +123,7 @@ def droppers_of(scene: Scene) -> int:
     InputError
         If they are not declared for one of the span lengths.
     """
-    data = line_data_of(scene)
+    data = scene.line_data
     auxiliary = () if data.auxiliary_wire is None else data.auxiliary_wire.dropper_positions
     return sum(map(len, (*data.dropper_positions, *auxiliary)))
 
