@@ -29,6 +29,12 @@ _OTHER_OPTIONS = (
     "options_left", "options_view", "malloc_debug", "malloc_dump", "malloc_view", "memory_view",
 )  # fmt: skip
 
+# Kinds of output that PETSc has at the end of a run, when no error can be refused any more.
+_VIEWERS = {
+    "-log_view": ("", "ascii"),
+    "-march_ts_view": ("", "ascii", "binary", "draw", "hdf5", "socket", "string", "vtk"),
+}
+
 
 def split_extras(extras: Sequence[str]) -> tuple[list[str], list[str]]:
     """Further ``key=value`` assignments and the PETSc options among trailing arguments.
@@ -75,14 +81,14 @@ def refuse_unwritable(arguments: Sequence[str]) -> None:
     Raises
     ------
     InputError
-        If a file cannot be written, or if the log is to be of another kind than text.
+        If a file cannot be written, or if there is no output of such a kind.
     """
     for name, value in itertools.pairwise(arguments):
         kind, colon, rest = value.partition(":")
         if not name.startswith("-") or value.startswith("-"):
             continue
-        if name == "-log_view" and kind not in ("", "ascii"):
-            raise InputError(f"-log_view {shown(value)[1:-1]} names no file; write -log_view :FILE")
+        if kind not in _VIEWERS.get(name, (kind,)):
+            raise InputError(f"{name} {shown(value)[1:-1]} names no file; write {name} :FILE")
         path = Path(rest.partition(":")[0])
         if not colon or path == Path() or not re.search("_(view|monitor)", name):
             continue

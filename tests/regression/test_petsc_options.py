@@ -166,6 +166,7 @@ def test_misspelt_options_are_told_with_the_nearest_name(
         (["-log_view", ":none/log"], "-log_view cannot write none/log: No such file or directory"),
         (["-log_view", ":log", "-march_ts_view", "ascii:none/view"], "-march_ts_view cannot write"),
         (["-log_view", "log.txt"], "-log_view log.txt names no file; write -log_view :FILE"),
+        (["-march_ts_view", "ts.txt"], "-march_ts_view ts.txt names no file; write -march_ts_view"),
     ],
 )
 def test_impossible_options_are_refused_before_anything_is_written(
