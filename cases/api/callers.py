@@ -21,8 +21,13 @@ _PROGRESS = "catenary.progress"
 
 
 def communicator(comm: Any) -> Any:
-    """The communicator that is given, else of all processes under mpirun, else of this one."""
+    """The communicator that is given, else of all processes under mpirun, else of this one.
+
+    Raises InputError if it is none.
+    """
     if comm is not None:
+        if not hasattr(comm, "rank"):
+            raise InputError(f"comm is {shown(comm)}; it must be a communicator of mpi4py")
         return comm
     return world() if launched_by_mpirun() else alone()
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError
 from catenary.callers import path_of
-from catenary.scenes import plain_value
+from catenary.cases.scene.input.faults import shown
+from catenary.scenes import tables_or_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,11 +130,13 @@ def uncertainty(
     where = "the table"
     if isinstance(table, str | Path):
         runs, where = read_run_table(path_of(table, "table")), str(table)
-    else:
+    elif isinstance(table, pd.DataFrame | Mapping):
         try:
             runs = run_table(pd.DataFrame(table))
         except ValueError as error:
             raise InputError(f"the table is no table of columns of one length: {error}") from error
+    else:
+        raise InputError(f"table is {shown(table)}; it must be a table, or a file or folder of one")
     if sample is not None:
         runs = run_table(runs.frame, sampling_like(sample)[0], where)
     found = evaluate(runs)
@@ -160,16 +163,10 @@ def write_uncertainty(found: Uncertainty, folder: Path) -> list[Path]:
 
 
 def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable, str]:
-    """The checked tables of a sampling, and where they were written, for sentences.
-
-    Parameters
-    ----------
-    sample : mapping, str or Path
-        The tables as nested dictionaries, or the file.
-    """
+    """The checked tables of a sampling, and where they were written, for sentences."""
     from catenary.cases.studies.sampling.tables import read_sampling, sampling_of
 
-    if isinstance(sample, Mapping):
-        where = "the table given as sample"
-        return sampling_of(plain_value(sample, "sample"), where), where
-    return read_sampling(path_of(sample, "sample", "a file, or its tables")), str(sample)
+    given, where = tables_or_file(sample, "sample"), "the table given as sample"
+    if isinstance(given, Path):
+        return read_sampling(given), str(sample)
+    return sampling_of(given, where), where

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from catenary.base.lone_process import alone
 from catenary.callers import path_of, say_nothing, say_on_error_stream
 from catenary.postproc.evaluate.wording import counted
-from catenary.scenes import Scene, SceneLike, checked, plain_value, scene_of
+from catenary.scenes import Scene, SceneLike, checked, scene_of, tables_or_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -179,24 +179,14 @@ def identified(
 
 
 def task_of(task: str | Path | Mapping[str, Any]) -> Task:
-    """The checked task of an identification.
+    """The checked task of an identification, from its TOML file or its tables.
 
-    Parameters
-    ----------
-    task : str, Path or mapping
-        The TOML file, or its tables.
-
-    Raises
-    ------
-    InputError
-        If it is wrong.
+    Raises InputError if it is wrong.
     """
     from catenary.cases.studies.identification.task import Task
     from catenary.cases.studies.task_files import read_task
 
-    if isinstance(task, Mapping):
-        return read_task(plain_value(task, "the task"), Task)
-    return read_task(path_of(task, "task", "a file, or its tables"), Task)
+    return read_task(tables_or_file(task, "task"), Task)
 
 
 def write_identified(found: Identified, folder: Path) -> list[Path]:

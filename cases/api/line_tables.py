@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -113,24 +113,7 @@ class Plan:
         """
         import pandas as pd
 
-        own, needs = self._own, self._own.needs
-        figures: dict[str, Any] = {
-            "n_nodes": own.n_nodes,
-            "n_unknowns": own.n_dofs,
-            "n_steps": needs.n_steps,
-            "n_droppers": own.n_droppers,
-            "n_steady_arms": own.n_arms,
-            "n_pantographs": own.n_pantographs,
-            "dt_s": own.dt,
-            "simulated_s": own.simulated,
-            "speed_m_per_s": own.speed,
-            "wave_speed_m_per_s": own.wave_speed,
-            "memory_B": needs.memory,
-            "wall_s": needs.march,
-            "result_B": needs.files.result,
-            "film_B": needs.files.film,
-        }
-        return pd.Series(figures, dtype=float)
+        return pd.Series(self._own.figures, dtype=float)
 
     @property
     def warnings(self) -> list[str]:

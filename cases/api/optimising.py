@@ -13,14 +13,13 @@ from catenary.callers import (
     ending_as_python,
     folder_of,
     n_at_once,
-    path_of,
     say_nothing,
     say_on_error_stream,
 )
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.task import ToleranceTask
-from catenary.scenes import Scene, SceneLike, draft_of, plain_value, scene_of
+from catenary.scenes import Scene, SceneLike, draft_of, scene_of, tables_or_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 logger = logging.getLogger("catenary.study")
 
 Task = str | Path | Mapping[str, Any]
-_PROGRAM = "a study of a Python program"
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,20 +229,49 @@ class Made:
         return text
 
 
-def optima(
+def optima(read: Callable[[], tuple[Draft, Task]], out: str | Path | None, **how: Any) -> Made:
+    """The optima of a task, for ``optimise`` and its verb, as of ``_made``. Not collective."""
+    from catenary.cases.studies.optimise import output, study
+
+    own = OptimiseTask, study.make_plan, study.optimise, output, output.RECORD
+    return _made(*own, read, out, **how)
+
+
+def tolerances(read: Callable[[], tuple[Draft, Task]], out: str | Path | None, **how: Any) -> Made:
+    """The tolerances of a task, for ``tolerance`` and its verb, as of ``_made``. Not collective."""
+    from catenary.cases.studies.tolerance import output, study
+
+    own = ToleranceTask, study.make_plan, study.find_tolerances, output, output.TABLE
+    return _made(*own, read, out, **how)
+
+
+def _made(
+    model: Any,
+    make_plan: Callable[[Draft, Any], Any],
+    find: Callable[..., Any],
+    output: Any,
+    table: str,
     read: Callable[[], tuple[Draft, Task]],
     out: str | Path | None,
     *,
-    command: str = _PROGRAM,
+    command: str = "a study of a Python program",
     jobs: int = 1,
     force: bool = False,
     warn: Callable[[str], None] = logger.warning,
     say: Callable[[str], None] = say_nothing,
 ) -> Made:
-    """The optima of a task, for ``optimise`` and its verb. Not collective.
+    """Plan a study, find what it looks for, and leave what its ``output`` writes. Not collective.
 
     Parameters
     ----------
+    model : class
+        Of the tables of the task.
+    make_plan, find : callable
+        Make the plan of a case and a task, and what is found by it.
+    output : module
+        Writes what is found, as text and as files.
+    table : str
+        One of these files.
     read : callable
         Gives the case and the task, once it is known that ``out`` can be taken.
     out, jobs, force
@@ -257,67 +284,10 @@ def optima(
     Raises
     ------
     InputError
-        As ``optimise``.
+        As ``optimise`` and ``tolerance``.
     Interrupted
         If a signal ends the study.
     """
-    from catenary.cases.studies.optimise import output, study
-
-    def plan() -> study.Plan:
-        draft, task = read()
-        return study.make_plan(draft, _task(task, OptimiseTask))
-
-    return _made(plan, study.optimise, output, output.RECORD, out, command, jobs, force, warn, say)
-
-
-def tolerances(
-    read: Callable[[], tuple[Draft, Task]],
-    out: str | Path | None,
-    *,
-    command: str = _PROGRAM,
-    jobs: int = 1,
-    force: bool = False,
-    warn: Callable[[str], None] = logger.warning,
-    say: Callable[[str], None] = say_nothing,
-) -> Made:
-    """The tolerances of a task, for ``tolerance`` and its verb. Not collective.
-
-    Parameters
-    ----------
-    read, out, command, jobs, force, warn, say
-        As of ``optima``.
-
-    Raises
-    ------
-    InputError
-        As ``tolerance``.
-    Interrupted
-        If a signal ends the study.
-    """
-    from catenary.cases.studies.tolerance import output, study
-
-    def plan() -> study.Plan:
-        draft, task = read()
-        return study.make_plan(draft, _task(task, ToleranceTask))
-
-    find = study.find_tolerances
-    return _made(plan, find, output, output.TABLE, out, command, jobs, force, warn, say)
-
-
-def _made(
-    make_plan: Callable[[], Any],
-    find: Callable[..., Any],
-    output: Any,
-    table: str,
-    out: str | Path | None,
-    command: str,
-    jobs: int,
-    force: bool,
-    warn: Callable[[str], None],
-    say: Callable[[str], None],
-) -> Made:
-    """Plan a study, find what it looks for, and leave what its ``output`` writes; ``table`` is one
-    of its files."""
     from catenary.cases.result_folder.output_folder import refuse_table
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.scene_sets import workers
@@ -325,17 +295,11 @@ def _made(
     n_jobs, folder = n_at_once(jobs), folder_of(out)
     if folder is not None:
         refuse_table(folder / table, force)
-    plan = make_plan()
+    draft, task = read()
+    plan = make_plan(draft, read_task(tables_or_file(task, "task"), model))
     for sentence in plan.warnings:
         warn(sentence)
     with held_study(folder, alone(), command, force) as (kept, write), workers(n_jobs) as pool:
         found = find(plan, pool, kept, say)
         files = write(lambda own: output.write(own, plan, found))
     return Made(plan, found, files, output)
-
-
-def _task(task: Task, model: Any) -> Any:
-    """A checked task."""
-    if isinstance(task, Mapping):
-        return read_task(plain_value(task, "the task"), model)
-    return read_task(path_of(task, "task", "a file, or its tables"), model)

@@ -210,21 +210,9 @@ def find_speeds(
 ) -> Answer:
     """Find the highest speeds, and write files if the marches have a folder.
 
-    Collective.
-
-    Parameters
-    ----------
-    marching : Marching
-        Marches the variants of the scene.
-    scene, speeds, criteria, direction
-        As of ``cases.studies.questions.highest_speed.find_speeds``.
-    command : str
-        Work of this process in words, for others that want the folder.
-
-    Raises
-    ------
-    InputError, Interrupted
-        As that.
+    ``marching`` marches the variants of the scene, ``command`` says to others that want the folder
+    what this process does; all else, and errors, are those of
+    ``cases.studies.questions.highest_speed.find_speeds``. Collective.
     """
     from catenary.cases.studies.questions import highest_speed as question
     from catenary.cases.studies.records import held_study
@@ -245,22 +233,8 @@ def find_separations(
 ) -> Answer:
     """March the distances of two pantographs, and write files if the marches have a folder.
 
-    Collective.
-
-    Parameters
-    ----------
-    marching, scene, command
-        As of ``find_speeds``.
-    distances : Distances
-        Distances of the pantographs.
-    explained : bool
-        Whether text and files say which waves explain the distances, for which the line is hung
-        once more; without it there are none.
-
-    Raises
-    ------
-    InputError, Interrupted
-        As ``cases.studies.questions.separation.find_separations``.
+    As ``find_speeds``. Text and files say which waves explain the distances, for which the line is
+    hung once more; without ``explained`` there are none. Collective.
     """
     from catenary.cases.studies.questions import separation as question
     from catenary.cases.studies.records import held_study

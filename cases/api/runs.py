@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from catenary.callers import (
     temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
+from catenary.cases.result_folder.output_folder import run_folder
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
@@ -80,13 +81,12 @@ def run(
     True
     """
     given, tables, comm = folder_of(out), checked(scene), communicator(comm)
-    with _set_up(tables, progress, comm) as options:
-        if given is not None:
-            made = run_into(given, tables, comm, options, force=force, only_summary=not report)
-            return _returned(made, comm)
-        with temporary_folder(comm, "run") as folder:
-            made = run_into(folder, tables, comm, options, force=force, only_summary=True)
-            return _returned(made, comm, in_memory=True)
+    in_memory = given is None
+    with _set_up(tables, progress, comm) as options, ExitStack() as stack:
+        folder = given or stack.enter_context(temporary_folder(comm, "run"))
+        only_summary = in_memory or not report
+        made = run_into(folder, tables, comm, options, force=force, only_summary=only_summary)
+        return _returned(made, comm, in_memory)
 
 
 def restart(
@@ -106,7 +106,7 @@ def restart(
     Parameters
     ----------
     folder : str or Path
-        The folder of the run, whose last state it goes on from.
+        The folder of the run, whose last state it goes on from, or its ``run.h5``.
     until_m : float, optional
         Where the leading pantograph is to stop [m], if that is later than the run says.
     evaluate : sequence of two floats, optional
@@ -137,7 +137,7 @@ def restart(
     >>> longer.outcome, bool(longer.force.position.max() > end + 9.0)
     ('done', True)
     """
-    own, comm, stretch = path_of(folder, "folder"), communicator(comm), None
+    own, comm, stretch = run_folder(path_of(folder, "folder")), communicator(comm), None
     until = None if until_m is None else number_of(until_m, "until_m")
     if evaluate is not None:
         places: Any = evaluate if np.ndim(evaluate) else [evaluate]
@@ -153,52 +153,17 @@ def restart(
 
 
 def run_into(
-    folder: Path,
-    scene: CheckedScene,
-    comm: Any,
-    petsc_options: Sequence[str],
-    *,
-    force: bool = False,
-    only_summary: bool = False,
-    on_closed: Callable[[str], None] = lambda outcome: None,
-    ready: Callable[[], None] = lambda: None,
+    folder: Path, scene: CheckedScene, comm: Any, petsc_options: Sequence[str], **how: Any
 ) -> Run:
     """A run into a folder, however it ends, of which no file is open. Collective.
 
-    Parameters
-    ----------
-    folder, scene, comm, force, only_summary, on_closed, ready
-        As of ``cases.run.runner.run_case``.
-    petsc_options : sequence of str
-        Options that PETSc was started with, for the record.
-
-    Returns
-    -------
-    Run
-        On every process. Its ``outcome`` says how the march ended.
-
-    Raises
-    ------
-    InputError, RunBroken
-        As ``run_case``.
+    ``petsc_options`` are those that PETSc was started with; ``how`` and errors are those of
+    ``cases.run.runner.run_case``. The ``outcome`` of the run says how the march ended.
     """
-    from catenary.cases.run.runner import on_as_many, run_case
+    from catenary.cases.run.runner import run_case
 
-    ended = on_as_many(
-        scene,
-        comm,
-        lambda ranks: run_case(
-            scene,
-            folder,
-            ranks,
-            force=force,
-            petsc_options=petsc_options,
-            on_closed=on_closed,
-            ready=ready,
-            only_summary=only_summary,
-        ),
-    )
-    from catenary.results import Run
+    ended = run_case(scene, folder, comm, petsc_options=petsc_options, **how)
+    from catenary.results import Run  # reads results, which no march needs
 
     return Run(None, folder, ended)
 
@@ -236,44 +201,16 @@ def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None)
 
 
 def go_on(
-    folder: Path,
-    scene: CheckedScene,
-    comm: Any,
-    petsc_options: Sequence[str],
-    *,
-    force: bool = False,
-    extends: bool = False,
-    only_summary: bool = False,
-    on_closed: Callable[[str], None] = lambda outcome: None,
+    folder: Path, scene: CheckedScene, comm: Any, petsc_options: Sequence[str], **how: Any
 ) -> Run:
-    """A run that goes on, as of ``run_into``. Collective.
+    """A run that goes on, as of ``run_into``, with what ``scene_to_continue`` gave. Collective.
 
-    Parameters
-    ----------
-    folder, comm, force, extends, only_summary, on_closed
-        As of ``cases.run.runner.restart_case``.
-    scene : Scene
-        What ``scene_to_continue`` gave.
-    petsc_options : sequence of str
-        As of ``run_into``.
+    ``how`` and errors are those of ``cases.run.runner.restart_case``.
     """
-    from catenary.cases.run.runner import on_as_many, restart_case
+    from catenary.cases.run.runner import restart_case
 
-    ended = on_as_many(
-        scene,
-        comm,
-        lambda ranks: restart_case(
-            scene,
-            folder,
-            ranks,
-            petsc_options=petsc_options,
-            on_closed=on_closed,
-            force=force,
-            extends=extends,
-            only_summary=only_summary,
-        ),
-    )
-    from catenary.results import Run
+    ended = restart_case(scene, folder, comm, petsc_options=petsc_options, **how)
+    from catenary.results import Run  # reads results, which no march needs
 
     return Run(None, folder, ended)
 

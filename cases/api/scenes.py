@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError
+from catenary.callers import path_of
 from catenary.cases.scene.input.case_files import titles
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import DEEPEST
-from catenary.cases.scene.input.toml_input import REMOVED
+from catenary.cases.scene.input.toml_input import REMOVED, value_at
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.load import Draft, read_draft
@@ -116,17 +117,10 @@ class Scene:
         """
         if not isinstance(key, str):
             raise InputError(f"{shown(key)} is no key; a key is a text, as in train.speed_km_h")
-        here: Any = resolved(self._checked)
-        for part in key.split("."):
-            if isinstance(here, list) and part.isdigit() and int(part) < len(here):
-                here = here[int(part)]
-            elif isinstance(here, dict) and part in here:
-                here = here[part]
-            elif is_known(key, known := known_keys(CheckedScene)):
-                return None
-            else:
-                raise InputError(unknown_key(key, "in the scene", known))
-        return here
+        value, known = value_at(resolved(self._checked), key), known_keys(CheckedScene)
+        if value is None and not is_known(key, known):
+            raise InputError(unknown_key(key, "in the scene", known))
+        return value
 
     def to_dict(self) -> dict[str, Any]:
         """The scene as it is written, with what was replaced, as nested dictionaries.
@@ -242,6 +236,17 @@ def _values(
             yield from _values(value, where, f"{key}.")
         else:
             yield key, REMOVED if value is None else plain_value(value, f"{key} {where}"), where
+
+
+def tables_or_file(given: Any, argument: str) -> dict[str, Any] | Path:
+    """The tables of an argument as TOML would give them, or the file that has them.
+
+    Raises InputError if it is neither.
+    """
+    if isinstance(given, Mapping):
+        tables: dict[str, Any] = plain_value(given, argument)
+        return tables
+    return path_of(given, argument, "a file, or its tables")
 
 
 def plain_value(value: Any, where: str, depth: int = 0) -> Any:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,7 @@ from catenary.scenes import SceneLike, checked
 if TYPE_CHECKING:
     import pandas as pd
 
-    from catenary.cases.studies.sensitivity.at_rest import RestSensitivity
-    from catenary.cases.studies.sensitivity.study import Sensitivity
+    from catenary.postproc.report.study_table import StudyTable
 
 SENSITIVITIES, AT_REST = "sensitivity.csv", "sensitivity_at_rest.csv"
 
@@ -81,91 +81,59 @@ def derivatives(
     droppers: bool = False,
     progress: bool = False,
 ) -> Derivatives:
-    """Differentiate a march, for ``sensitivity`` and its verb. Not collective.
-
-    Parameters
-    ----------
-    scene, parameters, droppers, progress
-        As of ``sensitivity``.
-
-    Raises
-    ------
-    InputError, RunBroken
-        As ``sensitivity``.
-    """
+    """Differentiate a march, for ``sensitivity`` and its verb, with its errors. Not collective."""
     own, comm = checked(scene), alone()  # starts MPI as one process, before anything imports it
+    from catenary.cases.studies.sensitivity.output import as_text, table_of
     from catenary.cases.studies.sensitivity.study import sensitivity_of
 
     with progress_shown(progress, comm):
         found = sensitivity_of(own, list(parameters), comm, droppers=droppers, shows=progress)
-    return Derivatives(found)
-
-
-class Derivatives:
-    """Derivatives of the statistics of a scene. As text what the program prints."""
-
-    def __init__(self, own: Sensitivity) -> None:
-        self._own = own
-
-    def table(self) -> pd.DataFrame:
-        """The table that ``sensitivity`` returns."""
-        import pandas as pd
-
-        from catenary.cases.studies.sensitivity.output import table_of
-
-        table = pd.DataFrame(table_of(self._own).records())
-        table.attrs["left_out"] = [f"{key}: {why}" for key, why in self._own.left_out.items()]
-        return table
-
-    def write(self, folder: Path) -> list[Path]:
-        """Write ``sensitivity.csv`` into a folder; returns the files. Not collective."""
-        from catenary.cases.studies.sensitivity.output import table_of
-        from catenary.postproc.report.study_table import write_files
-
-        return write_files(folder, {SENSITIVITIES: table_of(self._own)})
-
-    def __str__(self) -> str:
-        from catenary.cases.studies.sensitivity.output import as_text
-
-        return as_text(self._own)
-
-
-class RestDerivatives:
-    """Derivatives of the line of a scene at rest. As text what the program prints."""
-
-    def __init__(self, own: RestSensitivity) -> None:
-        self._own = own
-
-    def write(self, folder: Path) -> list[Path]:
-        """Write ``sensitivity_at_rest.csv`` into a folder; returns the files. Not collective."""
-        from catenary.cases.studies.sensitivity.at_rest import along_span
-        from catenary.postproc.report.study_table import write_files
-
-        return write_files(folder, {AT_REST: along_span(self._own)})
-
-    def __str__(self) -> str:
-        from catenary.cases.studies.sensitivity.at_rest import rest_text
-
-        return rest_text(self._own)
+    return Derivatives(as_text(found), table_of(found), SENSITIVITIES, found.left_out)
 
 
 def rest_derivatives(
     scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
-) -> RestDerivatives:
-    """Differentiate a line at rest, for ``AtRest.sensitivity`` and its verb. Not collective.
+) -> Derivatives:
+    """Differentiate a line at rest, for the verb; as ``AtRest.sensitivity``. Not collective."""
+    from catenary.cases.studies.sensitivity.at_rest import (
+        along_span,
+        rest_sensitivity_of,
+        rest_text,
+    )
 
-    Parameters
+    found = rest_sensitivity_of(checked(scene), parameters, droppers=droppers)
+    return Derivatives(rest_text(found), along_span(found), AT_REST, found.left_out)
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Derivatives of the statistics of a scene, or of its line at rest.
+
+    Attributes
     ----------
-    scene : Scene, str, Path or mapping
-        The scene, or whatever ``load`` takes for one.
-    parameters, droppers
-        As of ``AtRest.sensitivity``.
-
-    Raises
-    ------
-    InputError
-        As ``AtRest.sensitivity``.
+    text : str
+        What the program prints.
+    rows : StudyTable
+        The table, which is written as ``file``.
+    left_out : mapping
+        Why there is no derivative by a usual parameter, by its key.
     """
-    from catenary.cases.studies.sensitivity.at_rest import rest_sensitivity_of
 
-    return RestDerivatives(rest_sensitivity_of(checked(scene), parameters, droppers=droppers))
+    text: str
+    rows: StudyTable
+    file: str
+    left_out: Mapping[str, str]
+
+    def table(self) -> pd.DataFrame:
+        """The table that a program gets."""
+        import pandas as pd
+
+        table = pd.DataFrame(self.rows.records())
+        table.attrs["left_out"] = [f"{key}: {why}" for key, why in self.left_out.items()]
+        return table
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write the table into a folder; returns the files. Not collective."""
+        from catenary.postproc.report.study_table import write_files
+
+        return write_files(folder, {self.file: self.rows})

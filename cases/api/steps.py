@@ -253,7 +253,7 @@ class Simulation:
         if self._own.set_speed(value):
             return
         if not (np.isfinite(value) and value >= 0.0):
-            raise InputError(f"speed is {value}; it must be at least 0 [m/s]")
+            raise InputError(f"speed is {value}; it must be at least 0 [m/s] and finite")
         raise InputError(
             f"speed cannot be set to {value:g} m/s: heads of this scene roll or bend, and where "
             "wires cross them is prepared for one speed"

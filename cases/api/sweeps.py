@@ -139,14 +139,9 @@ def sweep(
 def samples_of(
     sample: Mapping[str, Any] | str | Path, draft: Draft
 ) -> tuple[list[Variant], SamplingTable]:
-    """The variants that a sampling makes of a case, and its checked tables. Not collective.
+    """The variants that a sampling, its tables or its file, makes of a case; its checked tables.
 
-    Parameters
-    ----------
-    sample : mapping, str or Path
-        The tables of the sampling as nested dictionaries, or the file.
-    draft : Draft
-        The case.
+    Not collective.
     """
     from catenary.cases.studies.sampling.samples import samples
 
@@ -159,40 +154,16 @@ def plan_sweep(
     variants: Sequence[Variant],
     folder: Path,
     sampling: SamplingTable | None = None,
-    *,
-    full_report: bool = False,
-    only_statistics: bool = False,
-    histories: Sequence[str] = (),
-    force: bool = False,
+    **how: Any,
 ) -> PlannedSweep:
     """A sweep of a case into a folder, all scenes checked. Not collective.
 
-    Parameters
-    ----------
-    draft, variants, full_report, only_statistics, histories, force
-        As of ``cases.studies.sweep.sweep.sweep_of``.
-    folder : Path
-        Folder of the sweep.
-    sampling : SamplingTable, optional
-        What made the variants, if the table is to be evaluated.
-
-    Raises
-    ------
-    InputError
-        As ``sweep_of``.
+    ``sampling`` is what made the variants, if the table is to be evaluated; all else, and errors,
+    are those of ``cases.studies.sweep.sweep.sweep_of``.
     """
     from catenary.cases.studies.sweep.sweep import sweep_of
 
-    own = sweep_of(
-        draft,
-        variants,
-        folder,
-        full_report=full_report,
-        only_statistics=only_statistics,
-        histories=histories,
-        force=force,
-    )
-    return PlannedSweep(own, folder, sampling)
+    return PlannedSweep(sweep_of(draft, variants, folder, **how), folder, sampling)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ import catenary
 from catenary.base.errors import InputError
 from catenary.cases.cli import completion
 from catenary.cases.cli.varied_words import Verb
+from catenary.cases.result_folder.output_folder import run_folder
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -68,9 +69,7 @@ def verb(name: str, *, help: str, epilog: str, serial: bool = False) -> Callable
 serial_verb = partial(verb, serial=True)
 RunFolder = Annotated[
     Path,
-    typer.Argument(
-        parser=console.run_folder, metavar="FOLDER", help="Folder of a run, or its run.h5."
-    ),
+    typer.Argument(parser=run_folder, metavar="FOLDER", help="Folder of a run, or its run.h5."),
 ]
 Case = Annotated[
     str,
@@ -337,7 +336,12 @@ def begin(
         on_root,
         set_up_logging,
     )
-    from catenary.cases.process.petsc_options import as_arguments, idle_options, start_petsc
+    from catenary.cases.process.petsc_options import (
+        as_arguments,
+        idle_options,
+        refuse_unwritable,
+        start_petsc,
+    )
 
     # A process of its own is refused before MPI has started.
     read_before = None if launched_by_mpirun() else read()
@@ -349,6 +353,7 @@ def begin(
     what, options = read_before or on_root(comm, read, takes_long=True)
     table = scene_of(what).petsc.given()
     arguments = as_arguments(table, options)
+    on_root(comm, lambda: refuse_unwritable(options))
     start_petsc(arguments)
 
     def warn() -> None:

@@ -69,6 +69,11 @@ def main() -> None:
     if too_little := library_settings.too_little_memory():
         console.complain(too_little)
         sys.exit(console.BAD_INPUT)
+    try:
+        os.getcwd()
+    except OSError:
+        console.complain("the working directory is gone; change into one that is there")
+        sys.exit(console.BAD_INPUT)
     if launched_by_mpirun():
         # From here on the end of each rank waits for the others', so that a sentence of rank 0
         # is out before the launcher gets the exit code of another.

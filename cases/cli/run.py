@@ -287,13 +287,14 @@ def _needs_on(scene: Scene, job: SlurmJob) -> tuple[float, float]:
     from catenary.postproc.evaluate.wording import duration
 
     plan = make_plan(scene)
-    march = march_on(problem_of(scene), plan.needs, plan.n_dofs, job.ranks)
+    n_unknowns = int(plan.figures["n_unknowns"])
+    march = march_on(problem_of(scene), plan.needs, n_unknowns, job.ranks)
     if job.ranks > 1 and march >= plan.needs.march:
         console.warn(
             f"On {job.ranks} ranks the march takes about {duration(march)}, on one "
             f"{duration(plan.needs.march)}: take --ranks 1."
         )
-    others = (job.a_node - 1) * MEMORY_OF_RANK_PER_UNKNOWN * plan.n_dofs
+    others = (job.a_node - 1) * MEMORY_OF_RANK_PER_UNKNOWN * n_unknowns
     return march, plan.needs.memory + others
 
 

@@ -1,7 +1,7 @@
 """Whether what the program needs is installed and works here, found by trying each part.
 
 Parts are tried in processes of their own with a limit in time, so that a library which hangs or
-crashes is a finding and not the end. Nothing outside the standard library is imported here.
+crashes is a finding and not the end. No library is imported here.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+
+from catenary.base.lone_process import SETTINGS
 
 OK, MISSING, BROKEN = "OK", "missing", "broken"
 # No part answers later than this on a machine that works [s].
@@ -127,20 +129,27 @@ def _tried(part: str, program: str, remedy: str, needed: bool = False) -> Findin
     return Finding(part, state, answer, remedy, needed)
 
 
-def _answer(command: list[str], limit: float = LIMIT) -> tuple[int, str]:
-    """Exit code and last line of a command's answer; whatever it started has ended then."""
+def _answer(command: list[str], limit: float = LIMIT, *, launches: bool = False) -> tuple[int, str]:
+    """Exit code and last line of a command's answer; whatever it started has ended then.
+
+    Unless the command ``launches`` ranks, MPI starts there as it does in a run.
+    """
     # Files, not pipes: a process that is left behind would hold a pipe open. Their folder is their
     # own, as a program of Open MPI that ends removes what others make in a common one.
     with (
         tempfile.TemporaryFile("w+", errors="replace") as stream,
         tempfile.TemporaryDirectory(prefix="doctor", ignore_cleanup_errors=True) as folder,
     ):
-        environment = os.environ | {
-            "OMPI_ALLOW_RUN_AS_ROOT": "1",
-            "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-            "OMPI_MCA_rmaps_base_oversubscribe": "1",
-            "TMPDIR": folder,
-        }
+        environment = (
+            os.environ
+            | ({} if launches else SETTINGS)
+            | {
+                "OMPI_ALLOW_RUN_AS_ROOT": "1",
+                "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+                "OMPI_MCA_rmaps_base_oversubscribe": "1",
+                "TMPDIR": folder,
+            }
+        )
         try:
             process = subprocess.Popen(
                 command,
@@ -161,7 +170,7 @@ def _answer(command: list[str], limit: float = LIMIT) -> tuple[int, str]:
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
         stream.seek(0)
-        lines = [line.strip() for line in stream.read().splitlines() if line.strip()]
+        lines = [line.strip() for line in stream.read().splitlines() if re.search(r"\w", line)]
     if code == -1:
         return code, f"no answer within {limit:g} s"
     if code < 0:
@@ -226,7 +235,7 @@ def _mpi() -> Finding:
     launcher = shutil.which("mpirun")
     if launcher is None:
         return Finding("MPI", MISSING, "there is no mpirun in PATH", remedy)
-    code, answer = _answer([launcher, "-n", "2", sys.executable, "-c", _RANKS])
+    code, answer = _answer([launcher, "-n", "2", sys.executable, "-c", _RANKS], launches=True)
     if code == 0 and answer.startswith("ranks 2 "):
         library = answer.removeprefix("ranks 2 ")
         return Finding("MPI", OK, f"{library}, two ranks started and added up")

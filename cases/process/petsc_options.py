@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import itertools
+import re
 import shlex
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.keys.keys import nearest
+from catenary.postproc.files.disk_errors import reason
 
 # Options that PETSc looks up when the process ends, after `idle_options` was called.
 _LOOKED_UP_LAST = frozenset(
@@ -24,6 +28,12 @@ _OTHER_OPTIONS = (
     "march_ksp_monitor", "march_ksp_converged_reason", "log_view", "log_view_memory", "log_trace",
     "options_left", "options_view", "malloc_debug", "malloc_dump", "malloc_view", "memory_view",
 )  # fmt: skip
+
+# Kinds of output that PETSc has at the end of a run, when no error can be refused any more.
+_VIEWERS = {
+    "-log_view": ("", "ascii"),
+    "-march_ts_view": ("", "ascii", "binary", "draw", "hdf5", "socket", "string", "vtk"),
+}
 
 
 def split_extras(extras: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -61,6 +71,34 @@ def as_arguments(table: Mapping[str, Any], command_line: Sequence[str] = ()) -> 
         elif value is not True:
             words.append(str(value))
     return words + list(command_line)
+
+
+def refuse_unwritable(arguments: Sequence[str]) -> None:
+    """Refuse output of PETSc that it would find impossible when the run is made. Not collective.
+
+    Its viewers are named KIND:FILE:FORMAT, each of which may be left out.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written, or if there is no output of such a kind.
+    """
+    for name, value in itertools.pairwise(arguments):
+        kind, colon, rest = value.partition(":")
+        if not name.startswith("-") or value.startswith("-"):
+            continue
+        if kind not in _VIEWERS.get(name, (kind,)):
+            raise InputError(f"{name} {shown(value)[1:-1]} names no file; write {name} :FILE")
+        path = Path(rest.partition(":")[0])
+        if not colon or path == Path() or not re.search("_(view|monitor)", name):
+            continue
+        is_new = not path.exists()
+        try:
+            path.open("ab").close()
+        except OSError as error:
+            raise InputError(f"{name} cannot write {path}: {reason(error)}") from error
+        if is_new:
+            path.unlink()
 
 
 def start_petsc(arguments: Sequence[str]) -> None:

@@ -77,6 +77,12 @@ def prepare(folder: Path, force: bool) -> None:
             trial.unlink()
 
 
+def run_folder(path: str | Path) -> Path:
+    """The folder of a run, for which its result file may stand. Not collective."""
+    path = Path(path)
+    return path.parent if path.name == RUN_FILE and path.is_file() else path
+
+
 def refuse_impossible(folder: Path) -> None:
     """Raise InputError if a folder of this name cannot be, without making it. Not collective."""
     try:

@@ -10,11 +10,12 @@ import json
 import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -61,8 +62,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("catenary.runner")
 
-T = TypeVar("T")
-
 
 class Phases:
     """Wall time of the phases of a run [s], each shown while it lasts, and also a PETSc log stage.
@@ -108,29 +107,6 @@ def performance(outcome: Outcome, phases: Phases, n_ranks: int) -> dict[str, Any
     }
 
 
-def on_as_many(scene: Scene, comm: Any, run: Callable[[Any], T]) -> T:
-    """The result of ``run`` on the ranks that a scene needs. Collective.
-
-    With a window rank 0 runs alone, and the others sleep until it has finished: a step of some tens
-    of spans takes less time than messages between ranks. Sleeping ranks ignore signals; an MPI
-    launcher sends these to rank 0 as well.
-    """
-    if comm.size == 1 or scene.window.mode == OFF:
-        return run(comm)
-    from catenary.base.mpi import MPI
-
-    if comm.rank == 0:
-        logger.warning(
-            "window.mode is %s: what moves is so short that one rank steps it; the other %d wait "
-            "and make nothing faster, start it without mpirun",
-            scene.window.mode,
-            comm.size - 1,
-        )
-        return on_root(comm, lambda: run(MPI.COMM_SELF), takes_long=True)
-    with StopRequest():
-        return on_root(comm, lambda: run(MPI.COMM_SELF), takes_long=True)
-
-
 @dataclass
 class RunOutcome:
     """Result of a run.
@@ -159,6 +135,8 @@ def run_case(
 ) -> RunOutcome:
     """Simulate a scene and write results, fields and report into ``out_dir``. Collective.
 
+    On several ranks a scene with a window is run on rank 0 alone.
+
     Parameters
     ----------
     scene : Scene, the same on all ranks
@@ -181,12 +159,17 @@ def run_case(
         If files cannot be written.
     """
     allowed = force if large is None else large
-    order = _Order(
-        scene, out_dir, comm, petsc_options, on_closed, None, only_summary, ready, excited=excited
-    )
-    with held(out_dir, comm, f"catenary run {scene.case.name}"):
-        on_root(comm, lambda: prepare(out_dir, force))
-        return _run(order, lambda size: check_size(out_dir, size, allowed))
+
+    def run(ranks: Any) -> RunOutcome:
+        order = _Order(
+            *(scene, out_dir, ranks, petsc_options, on_closed, None, only_summary, ready),
+            excited=excited,
+        )
+        with held(out_dir, ranks, f"catenary run {scene.case.name}"):
+            on_root(ranks, lambda: prepare(out_dir, force))
+            return _run(order, lambda size: check_size(out_dir, size, allowed))
+
+    return _on_as_many(scene, comm, run)
 
 
 def restart_case(
@@ -215,12 +198,43 @@ def restart_case(
     """
     from catenary.cases.run.continuing import state_to_continue
 
-    with held(out_dir, comm, f"catenary restart {out_dir}"):
-        state = on_root(comm, lambda: state_to_continue(out_dir / RUN_FILE, extends))
-        order = _Order(
-            scene, out_dir, comm, petsc_options, on_closed, state, only_summary, extends=extends
-        )
-        return _run(order, lambda size: check_room_to_continue(out_dir, size, force))
+    def go_on(ranks: Any) -> RunOutcome:
+        with held(out_dir, ranks, f"catenary restart {out_dir}"):
+            state = on_root(ranks, lambda: state_to_continue(out_dir / RUN_FILE, extends))
+            order = _Order(
+                *(scene, out_dir, ranks, petsc_options, on_closed, state, only_summary),
+                extends=extends,
+            )
+            return _run(order, lambda size: check_room_to_continue(out_dir, size, force))
+
+    return _on_as_many(scene, comm, go_on)
+
+
+def _on_as_many(scene: Scene, comm: Any, run: Callable[[Any], RunOutcome]) -> RunOutcome:
+    """The result of ``run`` on the ranks that a scene needs. Collective.
+
+    With a window rank 0 runs alone, and the others sleep until it has finished: a step of some tens
+    of spans takes less time than messages between ranks. Sleeping ranks ignore signals; an MPI
+    launcher sends these to rank 0 as well.
+    """
+    if comm.size == 1 or scene.window.mode == OFF:
+        return run(comm)
+    from catenary.base.mpi import MPI
+
+    if comm.rank == 0:
+        _warn_of_idle(scene.window.mode, comm.size - 1)
+    with StopRequest() if comm.rank else nullcontext():
+        return on_root(comm, lambda: run(MPI.COMM_SELF), takes_long=True)
+
+
+@cache  # once for many runs
+def _warn_of_idle(mode: str, n_idle: int) -> None:
+    logger.warning(
+        "window.mode is %s: what moves is so short that one rank steps it; the other %d wait and "
+        "make nothing faster, start it without mpirun",
+        mode,
+        n_idle,
+    )
 
 
 @dataclass(frozen=True)

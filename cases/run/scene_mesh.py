@@ -77,6 +77,8 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     ------
     InputError
         If the file must not be written, or the line has no equilibrium.
+    RunBroken
+        If the disk refuses.
     """
     new_file(path, DRAWN, force)
     from catenary.cases.scene.problem import problem_of
@@ -84,7 +86,12 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
 
     problem, mesh = problem_of(scene), mesh_of(scene)
     figure, stretch = line_figure(scene, problem, mesh, find_form(problem, mesh)[1])
-    figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
+    try:
+        figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
+    except OSError as error:
+        from catenary.postproc.files.disk import unwritten  # loads HDF5
+
+        raise unwritten(path, error) from error
     return stretch
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -25,28 +25,10 @@ from catenary.cases.scene.input.toml_input import (
 )
 from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys, list_of, names_value, with_kinds
-from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.scene import Scene
 
 # Tables that are filled in: with the name and the folder of the case, and with what files hold.
 _FILLED_IN = ("case", "mesh", "vehicle", "evaluation", "line", "irregularities")
-
-
-class _Sound:
-    """The latest scene that drafts of one case have made: what they share with it is sound."""
-
-    def __init__(self) -> None:
-        self._latest: tuple[dict[str, Any], Scene] | None = None
-
-    def scene(self, raw: dict[str, Any], origin: Origin, folder: Path | None) -> Scene:
-        """The checked scene of ``raw``, as ``scene_from`` makes it."""
-        before, like = self._latest or ({}, None)
-        if like is not None and like.origin.taken_in:  # what was in files may be otherwise now
-            like = None
-        changed = {name for name in {**before, **raw} if before.get(name) is not raw.get(name)}
-        made = scene_from(raw, origin, folder, None if like is None else Shared(like, changed))
-        self._latest = raw, made
-        return made
 
 
 @dataclass(frozen=True)
@@ -60,7 +42,6 @@ class Draft:
     folder : of the file, to which its own paths are relative; None of a table without a file
     given : pairs of a key that was assigned, and the place of that
     recorded : whether a result recorded it
-    sound : what is known of drafts that were made of each other
     """
 
     raw: dict[str, Any]
@@ -68,7 +49,6 @@ class Draft:
     folder: Path | None = None
     given: tuple[tuple[str, str], ...] = ()
     recorded: bool = False
-    sound: _Sound = field(default_factory=_Sound, repr=False, compare=False)
 
     def assigned(self, values: Iterable[tuple[str, Any, str]]) -> Draft:
         """This scene with further values: dotted key, value (``REMOVED`` deletes the key) and, for
@@ -111,7 +91,7 @@ class Draft:
             As ``load_scene``.
         """
         origin = Origin(self.file, self.given, recorded=self.recorded)
-        return self.sound.scene(self.raw, origin, self.folder)
+        return scene_from(self.raw, origin, self.folder)
 
     def table(self) -> dict[str, Any]:
         """The nested table with the name of its case, and with paths that hold everywhere."""
@@ -186,25 +166,21 @@ def load_scene(
     return _assigned(draft, varied).scene()
 
 
-def scene_from(
-    raw: dict[str, Any], origin: Origin, folder: Path | None = None, shared: Shared | None = None
-) -> Scene:
+def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:
     """The checked scene of a nested table, such as ``problem.resolved`` gives.
 
     ``raw`` are the tables, ``origin`` the places where keys were written, for messages. ``folder``
     is the base of a relative ``mesh.file`` in the case file (on the command line it is the working
-    directory); its name is that of an unnamed case. What is ``shared`` with a sound scene, which no
-    file was read for, is taken from there.
+    directory); its name is that of an unnamed case.
     """
-    new = raw if shared is None else {name: raw[name] for name in shared.changed if name in raw}
-    refuse_deep(new, origin.file)
-    faults, more = text_faults(new, origin), 0
+    refuse_deep(raw, origin.file)
+    faults, more = text_faults(raw, origin), 0
     raw = raw | {name: copy.deepcopy(raw[name]) for name in _FILLED_IN if name in raw}
     _fill_in(raw, folder, origin.is_overridden("mesh.file"))
     origin, of_files = take_in_files(raw, origin, folder)
     faults += of_files
     try:
-        scene = Scene.model_validate(raw if shared is None else raw | shared.tables(raw))
+        scene = Scene.model_validate(raw)
     except ValidationError as failed:
         of_schema, more = schema_faults(failed, raw, Scene, origin)
         known = {fault.key for fault in faults}
@@ -212,20 +188,8 @@ def scene_from(
     if faults:
         raise SceneError(faults, more)
     scene._origin = origin
-    check(scene, None if shared is None else shared.changed)
+    check(scene)
     return scene
-
-
-class Shared(NamedTuple):
-    """Tables that a scene shares with a sound one: all but the ``changed`` ones."""
-
-    sound: Scene
-    changed: Collection[str]
-
-    def tables(self, raw: dict[str, Any]) -> dict[str, Table]:
-        """Tables of ``raw`` as the sound scene has them."""
-        own = {name: getattr(self.sound, name) for name in raw if name not in self.changed}
-        return {name: table for name, table in own.items() if isinstance(table, Table)}
 
 
 def recorded_scene(config: dict[str, Any], file: Path) -> Scene:

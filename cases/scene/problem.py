@@ -10,7 +10,7 @@ from catenary.cases.scene.line.ends import ends_of
 from catenary.cases.scene.line.hardware import fittings_of
 from catenary.cases.scene.line.imperfections import defects_of, irregularities_of
 from catenary.cases.scene.line.line import LineTable, tunnels_of
-from catenary.cases.scene.line.line_data import along_of, hanging_table, line_data
+from catenary.cases.scene.line.line_data import along_of, hanging_table
 from catenary.cases.scene.run.contact import contact_law_of
 from catenary.cases.scene.run.incidents import line_incidents, lowering_of
 from catenary.cases.scene.run.numerics import WindowTable
@@ -24,7 +24,6 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.base_motion import VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.standards.library import book_named
 from catenary.solver.problem.problem import (
     BOUNDED,
@@ -49,25 +48,14 @@ def line_of(scene: Scene) -> Line:
     InputError
         If the droppers are not declared for one of the span lengths, or do not fit into one.
     """
-    return replace(make_line(line_data_of(scene)), fittings=fittings_of(scene.line.fittings))
-
-
-def line_data_of(scene: Scene) -> LineData:
-    """The line of a scene as topologies take it.
-
-    Raises
-    ------
-    InputError
-        If the droppers are not declared for one of the span lengths.
-    """
-    return line_data(scene.line, scene.origin)
+    return replace(make_line(scene.line_data), fittings=fittings_of(scene.line.fittings))
 
 
 def end_of(scene: Scene) -> float:
     """Place where the leading pantograph stops [m]: ``train.end_m`` or its default."""
     if scene.train.end_m is not None:
         return scene.train.end_m
-    line = line_data_of(scene)
+    line = scene.line_data
     running_end = line.running_range[1]
     behind = max(placement.behind_m for placement in scene.train.pantographs)
     run_out = sum(line.span_lengths) / line.n_spans

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Iterator
+from functools import cached_property
 from typing import Any
 
 from pydantic import Field, PrivateAttr
 
 from catenary.cases.scene.input.faults import Fault, Origin
+from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.error_sentences import refusal
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Defect, IrregularitiesTable
 from catenary.cases.scene.line.line import LineTable
+from catenary.cases.scene.line.line_data import line_data
 from catenary.cases.scene.run.case import CaseTable, EvaluationTable, OutputTable
 from catenary.cases.scene.run.contact import ContactTable
 from catenary.cases.scene.run.incidents import Incident
@@ -26,6 +29,7 @@ from catenary.cases.scene.run.wind import WindTable
 from catenary.cases.scene.train.mechanism import Name
 from catenary.cases.scene.train.pantograph import PantographTable
 from catenary.cases.scene.train.train import TrainTable, VehicleTable
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.effects import all_effects as effect_registry
 from catenary.solver.effects.effect import Limit
 
@@ -79,6 +83,17 @@ class Scene(Table):
         """Origin of the keys, for sentences about them."""
         return self._origin
 
+    @cached_property
+    def line_data(self) -> LineData:
+        """The line as topologies take it, made once: all checks look at it.
+
+        Raises
+        ------
+        InputError
+            If the droppers are not declared for one of the span lengths.
+        """
+        return line_data(self.line, self._origin)
+
     def refused(self, key: str, why: str, *, value: object = None) -> Fault:
         """The fault of a key: its value, where it was written, and why it cannot be.
 
@@ -108,19 +123,20 @@ class Scene(Table):
 
     def _at(self, key: str) -> object:
         """The value of a dotted key, which exists; of an effect whether it is on."""
-        here: Any = self
         if key.startswith("effects."):
             return self.switches()[key.removeprefix("effects.")]
-        for part in key.split("."):
-            if isinstance(here, Table):
-                here = getattr(here, part)
-            else:
-                here = here[int(part) if isinstance(here, list) else part]
-        return here
+        return value_at(self.model_dump(), key)
 
     def fault(self, key: str, sentence: str) -> Fault:
         """The fault of a key; ``sentence`` continues after the key's name and place."""
         return Fault(key, f"{key} {self._origin.of(key)} {sentence}")
+
+    def missing(self, key: str, meaning: str, why: str = "", *, of: str = "") -> Fault:
+        """The fault of a key that is not there; ``of`` is the table that is, ``why`` a sentence's
+        end."""
+        end = f": {why}" if why else ""
+        named = f"{key} ({meaning})" if meaning else key
+        return Fault(key, f"{named} is missing {self._origin.of(of or key)}{end}")
 
     def needs_effect(self, key: str, effect: str) -> Fault:
         """The fault of a key that acts only with an effect that is off by default."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.case_files import CASE_FILE, find_case
 from catenary.cases.scene.input.csv_files import span_table
+from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.input.plain_text import plain, read_text, read_whole
 from catenary.cases.scene.input.toml_input import read_toml
 from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
@@ -93,8 +94,8 @@ def write_case(
     files = {name: read_whole(path, f"{path}") for name, path in copied.items() if path is not None}
     lengths = [] if spans is None else span_table(spans)
     text = starting_text(kind, folder.resolve().name, lengths, droppers is not None)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".new-case") as made:
+    there = next(path for path in folder.absolute().parents if path.is_dir())
+    with tempfile.TemporaryDirectory(dir=there, prefix=".new-case") as made:
         inner = Path(made, "case")
         inner.mkdir()
         for name, content in files.items():
@@ -105,13 +106,16 @@ def write_case(
                 complete(inner)
             load_scene(inner)
         except InputError as error:
-            # The files are named by where they come from: the folder was never there.
-            sentence = str(error)
+            # Files are named by where they come from: those of the new folder were never there.
+            sentence, n_more = error.faults[0].sentence, len(error.faults) - 1
+            n_more += error.more if isinstance(error, SceneError) else 0
             for name, path in copied.items():
                 sentence = sentence.replace(str(inner / name), str(path))
+            sentence = sentence.replace(str(inner / CASE_FILE), f"the new case begun from {kind}")
             if spans is not None and droppers is None and "line.dropper" in sentence:
                 sentence += ", or a planner's table by --droppers"
-            raise InputError(sentence.replace(str(inner), str(folder))) from error
+            raise InputError(sentence + f" (and {n_more} more)" * bool(n_more)) from error
+        folder.parent.mkdir(parents=True, exist_ok=True)
         inner.rename(folder)
     return folder / CASE_FILE
 

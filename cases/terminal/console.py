@@ -167,12 +167,6 @@ def folder(text: str) -> Path:
     return Path(text)
 
 
-def run_folder(text: str) -> Path:
-    """The folder of a run, for which its result file may stand. Not collective."""
-    path = Path(text)
-    return path.parent if path.name == "run.h5" and path.is_file() else path
-
-
 def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
     """A command whose foreseen errors end in a sentence and an exit code, not in a traceback.
 

@@ -54,7 +54,8 @@ class Results(TrainOfRun):
         path = Path(path)
         self.path = path / RUN_FILE if path.is_dir() else path
         if image is None and not self.path.is_file():
-            raise InputError(f"{self.path} does not exist: name a result file or its folder")
+            what = "is no file" if self.path.exists() else "does not exist"
+            raise InputError(f"{self.path} {what}: name a result file or its folder")
         super().__init__(ValidatedFile(self.path, records, image))
 
     @classmethod

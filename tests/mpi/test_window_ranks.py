@@ -17,8 +17,10 @@ import pytest
 from mpi4py import MPI
 from scenes import Scene, load_scene
 
+import catenary
 from catenary import InputError
-from catenary.cases.run.runner import RunOutcome, on_as_many, run_case
+from catenary.cases.run import runner
+from catenary.cases.run.runner import RunOutcome, run_case
 
 COMM = MPI.COMM_WORLD
 SPANS = ("window.spans_ahead=2", "window.spans_behind=2")
@@ -36,15 +38,14 @@ def folder() -> Iterator[Path]:
 
 
 def run(scene: Scene, out: Path, comm: MPI.Comm) -> RunOutcome:
-    return on_as_many(
-        scene, comm, lambda ranks: run_case(scene, out, ranks, only_summary=True, force=False)
-    )
+    return run_case(scene, out, comm, only_summary=True)
 
 
 def test_a_window_gives_on_ranks_what_it_gives_on_one(
     folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     scene = load_scene("ac_simple", [*SHORT, "window.mode=bounded", *SPANS])
+    runner._warn_of_idle.cache_clear()  # it warns once, whatever ran before
     with caplog.at_level(logging.WARNING, "catenary.runner"):
         outcome = run(scene, folder / "ranks", COMM)
     assert outcome.outcome == "done" and outcome.summary
@@ -64,3 +65,16 @@ def test_a_refusal_reaches_all_ranks(folder: Path) -> None:
     run(scene, folder / "twice", COMM)
     with pytest.raises(InputError, match="run.h5"):
         run(scene, folder / "twice", COMM)
+
+
+def test_a_sweep_of_windows_takes_one_rank_for_each_run() -> None:
+    """All variants were refused, as their runs had several ranks."""
+    scene = catenary.load("ac_simple").replace(
+        evaluation={"from_m": 200.0, "to_m": 250.0},
+        train={"end_m": 260.0},
+        window={"mode": "bounded", "spans_ahead": 2.0, "spans_behind": 2.0},
+    )
+    table = catenary.sweep(scene, {"train.speed_km_h": [280, 300]}, comm=COMM)
+    assert table.outcome.tolist() == ["done", "done"]
+    alone = catenary.run(scene.replace(train={"speed_km_h": 300}), comm=MPI.COMM_SELF)
+    assert table.std_N[1] == alone.statistics.std_N.iloc[0]

@@ -162,7 +162,7 @@ def assert_same_tables(out: Path, whole: Path) -> None:
         (float("nan"), None, "until_m is nan"),
         (1e5, None, r"train.end_m is 100000.* in restart\(\) \(until_m\).*inside the line"),
         (700.0, "600", r"evaluate is 600, but must be two places \[m\], e\.g\. \(360, 600\)"),
-        (700.0, "680:640", r"in restart\(\) \(evaluate\).*must end after it starts"),
+        (700.0, "680:640", r"in restart\(\) \(evaluate\).*must end behind its start"),
     ],
 )
 def test_an_end_that_cannot_be_is_refused(until: float, evaluated: str | None, says: str) -> None:

@@ -162,6 +162,11 @@ def test_misspelt_options_are_told_with_the_nearest_name(
         (["-march_ts_type", "alpha2"], "give numerics.scheme"),
         (["-march_ts_type", "nonsense"], "PETSc refuses the options under -march_"),
         (["-march_pc_factor_mat_ordering_type", "nonsense"], "type: nonsense"),
+        # What PETSc would find at the end of the run, and print with its trace.
+        (["-log_view", ":none/log"], "-log_view cannot write none/log: No such file or directory"),
+        (["-log_view", ":log", "-march_ts_view", "ascii:none/view"], "-march_ts_view cannot write"),
+        (["-log_view", "log.txt"], "-log_view log.txt names no file; write -log_view :FILE"),
+        (["-march_ts_view", "ts.txt"], "-march_ts_view ts.txt names no file; write -march_ts_view"),
     ],
 )
 def test_impossible_options_are_refused_before_anything_is_written(

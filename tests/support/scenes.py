@@ -15,8 +15,9 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.case_files import find_case, shipped
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, read_draft, scene_from
-from catenary.cases.scene.problem import line_data_of, line_of, problem_of, resolved
+from catenary.cases.scene.problem import line_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
+from catenary.meshgen.topologies.line_data import LineData
 from catenary.scenes import Scene as SceneOfUsers
 
 __all__ = [
@@ -54,6 +55,11 @@ TINY_WORDS = (
     "output.field_every_s=0",
     "output.energy_every_s=0",
 )
+
+
+def line_data_of(scene: Scene) -> LineData:
+    """The line of a scene as topologies take it."""
+    return scene.line_data
 
 
 def with_words(case: str | Path, words: Sequence[str] = (), short: bool = False) -> catenary.Scene:

@@ -28,11 +28,11 @@ def test_unknowns_are_the_nodes_of_the_mesh_times_the_unknowns_of_the_effects() 
     scene = load_scene("en50318_2002", ["mesh.elements_per_gap=4"])
     plan = make_plan(scene)
     # Per wire: 22 spans of 9 droppers make 10 gaps of 4 elements each, and one node more.
-    assert plan.n_nodes == 2 * (22 * 10 * 4 + 1) == mesh_of(scene).n_nodes
+    assert plan.figures["n_nodes"] == 2 * (22 * 10 * 4 + 1) == mesh_of(scene).n_nodes
     rows = dict(plan.rows)
     assert rows["unknowns"].endswith("(w, theta_y)")
-    assert plan.n_dofs == 2 * plan.n_nodes
-    assert plan.n_droppers == 22 * 9
+    assert plan.figures["n_unknowns"] == 2 * plan.figures["n_nodes"]
+    assert plan.figures["n_droppers"] == 22 * 9
     assert rows["mesh"].endswith(f"elements of {5.0 / 4:.2f} to {6.5 / 4:.2f} m")
 
 

@@ -68,7 +68,6 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
 
     module = types.ModuleType("catenary.cases.run.runner")
     module.run_case = run_case  # type: ignore[attr-defined]
-    module.on_as_many = lambda scene, comm, run: run(comm)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "catenary.cases.run.runner", module)
     monkeypatch.setattr("catenary.cases.process.petsc_options.start_petsc", lambda arguments: None)
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
@@ -358,3 +357,29 @@ def test_a_stability_map_is_refused_where_it_cannot_be_made(tmp_path: Path) -> N
         assert said in result.stderr and result.stderr.count("\n") == 1
     assert (tmp_path / "stability_map.csv").read_text() == "mine"
     assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("mesh", "ac_simple", "-o", "full.png"),
+        ("mesh", "ac_simple", "-o", "full.svg"),
+        ("static", "ac_simple", "-o", "full.csv"),
+        ("static", "tensioned_section", "--temperatures", "0,10", "-o", "full.png"),
+    ],
+)
+def test_a_full_disk_is_told(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(words[-1]).symlink_to("/dev/full")
+    done = invoke(*words, "--force")
+    assert done.exit_code == 1, done.output
+    assert f"writing {words[-1]} failed (No space left on device): free some" in done.output
+
+
+def test_a_device_takes_no_uncertainty(tmp_path: Path) -> None:
+    table = tmp_path / "sweep.csv"
+    table.write_text("variant,a,outcome,pantograph,std_N\nx,1,done,p,2\n")
+    done = invoke("uncertainty", str(table), "-o", "/dev/null")
+    assert done.exit_code == 2 and "/dev/null is a file; name a folder" in done.output

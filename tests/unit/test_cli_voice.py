@@ -131,3 +131,14 @@ def test_streams_that_are_closed_lead_nowhere(closed: str) -> None:
     code = f'{sys.executable} -c "{streams}; {opened}" {closed}'
     done = subprocess.run(["bash", "-c", code], capture_output=True, timeout=200, check=False)
     assert done.returncode == 0, done
+
+
+@pytest.mark.process
+def test_a_working_directory_that_is_gone_is_told() -> None:
+    gone = "import os, sys, tempfile; own = tempfile.mkdtemp(); os.chdir(own); os.rmdir(own); "
+    words = [sys.executable, "-c", f"{gone}sys.argv[1:] = ['doctor']; {ENTRY}"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 2 and not done.stdout
+    assert done.stderr == (
+        "catenary: the working directory is gone; change into one that is there\n"
+    )

@@ -155,6 +155,15 @@ def test_a_line_without_droppers_takes_spans_alone(tmp_path: Path) -> None:
         (["--spans", "few.csv", "--droppers", "hung.csv"], "a new case needs 12, to run in"),
         (["--spans", "line 7.csv"], "spacing_m, or a planner's table by --droppers"),
         (["--spans", "hung.csv"], "the table of spans is"),
+        (
+            ["--spans", "short.csv"],
+            "line.span_m.19 is 3.0 in short.csv; it must be at least 5 [m]; usual",
+        ),
+        (
+            ["--spans", "line 7.csv", "--topology", "stitched"],
+            "line.dropper.positions_m in the new case begun from stitched holds for one span",
+        ),
+        (["--topology", "half"], "is missing in the new case begun from half (and 4 more)\n"),
         (["--spans", "line 7.csv", "--droppers", "typed.csv"], "droppers is typed.csv; its line 5"),
         (
             ["--spans", "line 7.csv", "--droppers", "part.csv"],
@@ -168,12 +177,20 @@ def test_what_makes_no_case_writes_nothing(
     monkeypatch.chdir(tmp_path)
     tables(tmp_path, 20)
     (tmp_path / "few.csv").write_text("span_m\n55\n55\n")
+    (tmp_path / "short.csv").write_text("span_m\n" + 19 * "55\n" + "3\n")
+    (tmp_path / "half").mkdir()
+    (tmp_path / "half/case.toml").write_text("[line]\nn_spans = 3\n")
     hung = (tmp_path / "hung.csv").read_text().splitlines(keepends=True)
     (tmp_path / "typed.csv").write_text("".join([*hung[:4], "1;x;0\n", *hung[5:]]))
     (tmp_path / "part.csv").write_text("".join(hung[:15]))
     before = sorted(tmp_path.iterdir())
     done = invoke("new", "a", *words)
     assert done.exit_code == 2 and sentence in done.output, done.output
+    assert sorted(tmp_path.iterdir()) == before
+    # A file that is named from the root is named so, once.
+    absolute = [str(tmp_path / word) if word.endswith(".csv") else word for word in words]
+    done = invoke("new", "deep/a", *absolute)
+    assert done.exit_code == 2 and f"{tmp_path}/{tmp_path}" not in done.output, done.output
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -240,6 +257,17 @@ def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
+def test_what_runs_do_without_is_not_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Open MPI starts a daemon out of PATH in processes of others; runs start without it."""
+    monkeypatch.setenv("PATH", "/nonexistent")
+    solved = installation._tried("PETSc", installation._PETSC, "mend it", needed=True)
+    assert solved.state == OK and "solves a small system" in solved.facts
+    mpi = installation._mpi()
+    assert mpi.state == MISSING and mpi.facts == "there is no mpirun in PATH"
+    assert not mpi.prevents_runs
+
+
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("program", "facts", "state"),
     [
@@ -247,7 +275,7 @@ def test_the_doctor_is_no_verb_of_several_ranks(tmp_path: Path) -> None:
         ("raise ValueError('it is old')", "ValueError: it is old", BROKEN),
         ("import os; os.kill(os.getpid(), 11)", "ended by signal 11", BROKEN),
         ("import time; time.sleep(60)", "no answer within 1 s", BROKEN),
-        ("print('7.1')", "7.1", OK),
+        ("print('7.1', '\\n----')", "7.1", OK),
     ],
 )
 def test_a_part_that_fails_is_a_finding(
@@ -262,7 +290,7 @@ def test_a_part_that_fails_is_a_finding(
 
 
 def test_without_mpirun_one_rank_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(installation, "_answer", lambda command: (0, "ranks 1 An MPI"))
+    monkeypatch.setattr(installation, "_answer", lambda command, **how: (0, "ranks 1 An MPI"))
     monkeypatch.setenv("PATH", str(tmp_path))
     found = installation._mpi()
     assert found.state == MISSING and not found.prevents_runs

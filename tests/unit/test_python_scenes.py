@@ -224,7 +224,7 @@ def test_the_plan_is_that_of_the_command_line(scene: catenary.Scene) -> None:
 
     own, plan = make_plan(load_scene(CASE)), catenary.plan(scene)
     assert str(plan) == plan_text(own)
-    assert plan.figures["n_unknowns"] == own.n_dofs and plan.figures["memory_B"] == own.needs.memory
+    assert plan.figures.to_dict() == own.figures and own.figures["memory_B"] == own.needs.memory
     assert plan.effects.simulated.sum() == len(own.on) and len(plan.effects) > len(own.on)
 
 

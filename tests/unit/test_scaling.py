@@ -51,7 +51,9 @@ def test_ranks_shorten_the_march_of_a_long_line_alone() -> None:
     def gain(ranks: int, *words: str) -> float:
         scene = load_scene("ambrosio2012", list(words))
         plan = make_plan(scene)
-        return plan.needs.march / march_on(problem_of(scene), plan.needs, plan.n_dofs, ranks)
+        return plan.needs.march / march_on(
+            problem_of(scene), plan.needs, int(plan.figures["n_unknowns"]), ranks
+        )
 
     assert gain(1, "line.n_spans=2000") == gain(64, "line.n_spans=2000", "window.mode=bounded") == 1
     assert 8 < gain(64, "line.n_spans=2000") < 64

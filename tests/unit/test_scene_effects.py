@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 from scenes import Scene, load_scene, problem_of, resolved, scene_from
@@ -193,3 +194,31 @@ def test_data_of_an_effect_may_stand_if_it_is_left_out_knowingly() -> None:
         "en50318_2002", ["contact.damping_N_s_per_m=10", "effects.contact_damping=false"]
     )
     assert "contact_damping" not in problem_of(scene).effects
+
+
+EXAMPLE = Path(__file__).parents[2] / "docs/examples/two_messengers.toml"
+ON, RATIOS = (
+    "effects.residual_dropper_stiffness=true",
+    [f"line.links.{i}.residual_stiffness_ratio=0.1" for i in (0, 1, 2, 3, 4, 5)],
+)
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "says"),
+    [
+        ("conductor_rail", [ON], r"effects.residual_dropper_stiffness is true on .* no droppers"),
+        (EXAMPLE, [ON], "line.links.0.residual_stiffness_ratio is 0 in .* needs a value greater"),
+        (EXAMPLE, RATIOS, "line.links.0.residual_stiffness_ratio is 0.1 on .* acts only with"),
+        (EXAMPLE, [*RATIOS, "effects.residual_dropper_stiffness=false"], ""),
+        (EXAMPLE, [*RATIOS, ON], ""),
+    ],
+)
+def test_force_of_slack_droppers_is_that_of_the_droppers_there_are(
+    case: str | Path, changes: list[str], says: str
+) -> None:
+    """Lines without the table ``line.dropper`` were refused with a traceback."""
+    if not says:
+        load_scene(case, changes)
+        return
+    with pytest.raises(InputError, match=says):
+        load_scene(case, changes)

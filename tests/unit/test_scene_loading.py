@@ -282,3 +282,18 @@ def test_every_key_has_a_help_text() -> None:
 )
 def test_units_follow_from_names(key: str, unit: str) -> None:
     assert unit_of(key) == unit
+
+
+@pytest.mark.parametrize(
+    ("ends", "key"),
+    [
+        (["train.start_m=700"], "train.start_m"),  # the default end is that of the statistics
+        (["train.start_m=500", "train.end_m=500"], "train.end_m"),
+        (["train.end_m=50"], "train.end_m"),
+    ],
+)
+def test_a_train_that_ends_before_it_starts_has_one_fault(ends: list[str], key: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load_scene("en50318_2002", ends, shortened=True)
+    (fault,) = refused.value.faults
+    assert fault.key == key and "nothing" not in fault.sentence

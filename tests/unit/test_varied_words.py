@@ -77,3 +77,21 @@ def test_submitted_sweeps_vary_them_too(tmp_path: Path) -> None:
 def test_refusals_name_the_option(words: list[str], told: str, tmp_path: Path) -> None:
     done = invoke("sweep", CASE, "-o", str(tmp_path / "out"), *words)
     assert done.exit_code == 2 and told in done.stderr, done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("run CASE -o out -options_view", "-options_view is no option of run: those of PETSc"),
+        ("run CASE -o out -log_view :log", "-log_view is no option of run: those of PETSc"),
+        ("restart out --set train.end_m=800", "--set belongs to `catenary run`"),
+        ("worst out --set=train.end_m=800", "--set belongs to `catenary run`"),
+    ],
+)
+def test_options_in_a_wrong_place_are_told_where_they_belong(
+    words: str, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = invoke(*words.replace("CASE", CASE).split())
+    assert done.exit_code == 2 and says in done.output, done.output
+    assert list(tmp_path.iterdir()) == []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -21,9 +21,6 @@ from catenary.cases.cli.app import (
 )
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
-
-if TYPE_CHECKING:
-    from catenary.sensitivities import Derivatives, RestDerivatives
 
 
 @serial_verb(
@@ -138,12 +135,11 @@ def sensitivity(
     scene = words.scene()
     if out is not None:
         refuse_table(out / (AT_REST if at_rest else SENSITIVITIES), force)
-    found: Derivatives | RestDerivatives
     if at_rest:
         found = rest_derivatives(scene, keys or [], droppers=droppers)
     else:
         found = derivatives(scene, keys or [], droppers=droppers, progress=not console.is_quiet())
-    console.say(str(found))
+    console.say(found.text)
     if out is not None:
         console.say(f"\n{found.write(out)[0]}")
     return console.DONE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
@@ -173,6 +172,7 @@ def what_if(
 ) -> int:
     """Collective."""
     from catenary.base.parallel import on_root
+    from catenary.callers import temporary_folder
     from catenary.cases.studies.questions import what_if as question
 
     def read() -> tuple[tuple[list[Job], list[str]], list[str]]:
@@ -186,12 +186,7 @@ def what_if(
     from catenary.cases.result_folder.folder_lock import held
 
     with ExitStack() as stack:
-        folder = out
-        if folder is None:
-            folder = on_root(
-                comm,
-                lambda: Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="catenary_"))),
-            )
+        folder = out or stack.enter_context(temporary_folder(comm, "what_if"))
         stack.enter_context(held(folder, comm, f"catenary what-if {words.case}"))
         ended = question.run(jobs, folder, comm, options)
         found = on_root(comm, lambda: question.differences(changes, ended, folder), takes_long=True)

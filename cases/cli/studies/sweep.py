@@ -243,6 +243,8 @@ def uncertainty(
     """Serial."""
     from catenary.estimates import write_uncertainty
 
+    if out is not None:
+        refuse_impossible(out)
     found = catenary.uncertainty(table, sample)
     files = write_uncertainty(found, out or (table if table.is_dir() else table.parent))
     console.say(str(found))

@@ -10,7 +10,11 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.cases.cli.app import Force, SceneWords, folder_option, serial_verb
-from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
+from catenary.cases.result_folder.output_folder import (
+    refuse_impossible,
+    refuse_table,
+    run_folder,
+)
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -106,7 +110,7 @@ def waves(
     from catenary.cases.studies.waves import study
     from catenary.cases.studies.waves.excited import Settings
 
-    folder, settings = console.run_folder(words.case), Settings(*astuple(excited))
+    folder, settings = run_folder(words.case), Settings(*astuple(excited))
     if excite not in EXCITATIONS:
         raise InputError(f"--excite is {excite}, but must be one of {', '.join(EXCITATIONS)}")
     train = excite == EXCITATIONS[0]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.base.errors import InputError, RunBroken
+from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.run.at_rest.temperatures import temperatures
 from catenary.cases.run.describe.arrivals import arrival_facts
@@ -181,4 +181,6 @@ def write_static(path: Path, table: Mapping[str, Any], registration: bool = Fals
             )
             stream.write(csv_text(_DROPPER_HEADS, rows))
     except OSError as error:
-        raise RunBroken(f"{path} could not be written: {error.strerror}") from error
+        from catenary.postproc.files.disk import unwritten  # loads HDF5
+
+        raise unwritten(path, error) from error

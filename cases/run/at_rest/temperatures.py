@@ -118,6 +118,8 @@ def temperatures(scene: Scene, differences: Sequence[float], picture: Path | Non
     ------
     InputError
         If the scene does not let its wires move along the track.
+    RunBroken
+        If the picture cannot be written.
     """
     switches = scene.switches()
     for name in _EFFECTS:
@@ -132,5 +134,10 @@ def temperatures(scene: Scene, differences: Sequence[float], picture: Path | Non
         # Matplotlib takes long to import.
         from catenary.postproc.report.pictures.line_pictures import draw_temperatures
 
-        draw_temperatures(rests, picture)
+        try:
+            draw_temperatures(rests, picture)
+        except OSError as error:
+            from catenary.postproc.files.disk import unwritten  # loads HDF5
+
+            raise unwritten(picture, error) from error
     return temperature_text(rests, problem.along.tensioner.ratio)

@@ -51,9 +51,7 @@ class Plan:
     ----------
     case, title : of the scene
     on, off : effects that are simulated, and those that are not
-    n_nodes, n_dofs, n_droppers, n_arms, n_pantographs : counts, ``n_dofs`` of unknowns
-    speed, wave_speed : of the train and of the contact wire [m/s]
-    dt, simulated : time step and simulated time [s]
+    figures : counts, speeds and times by name, in SI units
     needs : steps, estimates of memory and time, sizes of files
     warnings : sentences on waves from the ends of the line, empty if it is long enough
     rows : what a terminal shows of all this and of the scene, as label and text
@@ -63,15 +61,7 @@ class Plan:
     title: str
     on: list[EffectRow]
     off: list[EffectRow]
-    n_nodes: int
-    n_dofs: int
-    n_droppers: int
-    n_arms: int
-    n_pantographs: int
-    speed: float
-    wave_speed: float
-    dt: float
-    simulated: float
+    figures: dict[str, float]
     needs: Needs
     warnings: list[str]
     rows: list[tuple[str, str]]
@@ -111,15 +101,22 @@ def make_plan(scene: Scene) -> Plan:
         title=scene.case.title,
         on=on,
         off=off,
-        n_nodes=mesh.n_nodes,
-        n_dofs=numbering.n_unknowns,
-        n_droppers=len(mesh.droppers),
-        n_arms=len(mesh.steady_arms),
-        n_pantographs=len(problem.train.placements),
-        speed=problem.train.speed,
-        wave_speed=slowest_wave(problem.line),
-        dt=problem.numerics.dt,
-        simulated=simulated_time(problem),
+        figures={
+            "n_nodes": mesh.n_nodes,
+            "n_unknowns": numbering.n_unknowns,
+            "n_steps": needs.n_steps,
+            "n_droppers": len(mesh.droppers),
+            "n_steady_arms": len(mesh.steady_arms),
+            "n_pantographs": len(problem.train.placements),
+            "dt_s": problem.numerics.dt,
+            "simulated_s": simulated_time(problem),
+            "speed_m_per_s": problem.train.speed,
+            "wave_speed_m_per_s": slowest_wave(problem.line),
+            "memory_B": needs.memory,
+            "wall_s": needs.march,
+            "result_B": needs.files.result,
+            "film_B": needs.files.film,
+        },
         needs=needs,
         warnings=waves["warnings"],
         rows=[

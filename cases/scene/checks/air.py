@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.keys.table import take_away
+from catenary.cases.scene.keys.table import StretchTable, take_away
 from catenary.cases.scene.keys.units import speed_from_km_h
 from catenary.cases.scene.line.line_data import wire_tables
 from catenary.cases.scene.problem import pantograph_of, static_force
@@ -25,21 +25,9 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     if scene.switches()["wind"] and table.speed_m_per_s > 0.0:
         for name, wire in wire_tables(scene.line).items():
             if wire.diameter_mm is None:
-                key = f"{name}.diameter_mm"
-                yield Fault(
-                    key,
-                    f"{key} is missing {scene.origin.of(name)}: the drag of the wind "
-                    "depends on it; give it, or write effects.wind = false",
-                )
-    end = line.support_positions[-1]
-    for i, stretch in enumerate(table.stretches):
-        if stretch.from_m >= end:
-            key = f"wind.stretches.{i}.from_m"
-            yield scene.refused(key, f"the line ends at {end:g} m")
-    for i, (before, after) in enumerate(pairwise(table.stretches), start=1):
-        if after.from_m < before.to_m:
-            why = f"it must be {before.to_m:g} at least, where the stretch before it ends"
-            yield scene.refused(f"wind.stretches.{i}.from_m", why)
+                why = "the drag of the wind depends on it; give it, or write effects.wind = false"
+                yield scene.missing(f"{name}.diameter_mm", "", why, of=name)
+    yield from _one_after_the_other(scene, "wind.stretches", table.stretches, line, "stretch")
     is_given = "roughness_length_m" in table.model_fields_set and not scene.origin.recorded
     if is_given and table.profile == "power" and table.gusts is None:
         why = "nothing reads it with the profile power and no gusts"
@@ -57,22 +45,29 @@ def has_front(table: PantographTable) -> bool:
 
 def check_tunnels(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Tunnels that overlap, are nowhere on the line, or that nothing notices."""
-    tunnels, end = scene.line.tunnels, line.support_positions[-1]
-    for i, tunnel in enumerate(tunnels):
-        if tunnel.from_m >= end:
-            key = f"line.tunnels.{i}.from_m"
-            yield scene.refused(key, f"the line ends at {end:g} m")
-    for i, (before, after) in enumerate(pairwise(tunnels), start=1):
-        if after.from_m < before.to_m:
-            why = f"it must be {before.to_m:g} at least, where the tunnel before it ends"
-            yield scene.refused(f"line.tunnels.{i}.from_m", why)
+    tunnels = scene.line.tunnels
+    yield from _one_after_the_other(scene, "line.tunnels", tunnels, line, "tunnel")
     known = [place.name for place in scene.train.pantographs if place.name in scene.pantographs]
     if tunnels and known and not any(_meets_air(scene, name) for name in known):
-        yield Fault(
+        yield scene.fault(
             "line.tunnels",
-            f"line.tunnels {scene.origin.of('line.tunnels')} changes nothing: no pantograph of the "
-            "train has aerodynamics or a force of type aerodynamic_force",
+            "changes nothing: no pantograph of the train has aerodynamics or a force of type "
+            "aerodynamic_force",
         )
+
+
+def _one_after_the_other(
+    scene: Scene, key: str, stretches: Sequence[StretchTable], line: LineData, what: str
+) -> Iterator[Fault]:
+    """Stretches that begin beyond the line, or before the end of the one before."""
+    end = line.support_positions[-1]
+    for i, stretch in enumerate(stretches):
+        if stretch.from_m >= end:
+            yield scene.refused(f"{key}.{i}.from_m", f"the line ends at {end:g} m")
+    for i, (before, after) in enumerate(pairwise(stretches), start=1):
+        if after.from_m < before.to_m:
+            why = f"it must be {before.to_m:g} at least, where the {what} before it ends"
+            yield scene.refused(f"{key}.{i}.from_m", why)
 
 
 def check_crosswind(scene: Scene, line: LineData) -> Iterator[Fault]:

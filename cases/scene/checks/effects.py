@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.keys.table import take_away
 from catenary.cases.scene.line.droppers import FEWEST_SAGGING
-from catenary.cases.scene.line.line_data import arm_tables, dropper_tables, hanging_table
+from catenary.cases.scene.line.line_data import arm_tables, dropper_tables
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
@@ -21,8 +21,7 @@ from catenary.solver.effects.effect import Limit
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Damping, Problem
 
-# Effects that are off by default and need a value in the scene: the key that holds it.
-_DATA_OF = {"residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio"}
+_RESIDUAL = "residual_dropper_stiffness"
 
 
 def check_effect_names(scene: Scene) -> Iterator[Fault]:
@@ -97,15 +96,17 @@ def _requirements(
 
 def check_effect_data(scene: Scene) -> Iterator[Fault]:
     """Effects without the value that they need, and values without their effect."""
-    hung = hanging_table(scene.line)
-    values = {"residual_dropper_stiffness": 0.0 if hung is None else hung.residual_stiffness_ratio}
-    switches = scene.switches()
-    for name, value in values.items():
-        key = _DATA_OF[name]
-        if switches.get(name) and value == 0:
-            yield scene.refused(key, f"effects.{name} is on and needs a value greater than 0")
-        if value > 0 and name not in scene.effects and switches.get(name) is False:
-            yield scene.needs_effect(key, name)
+    # A line has one ratio for all droppers, as another check sees to.
+    name, on = _RESIDUAL, scene.switches()[_RESIDUAL]
+    key, hung = next(iter(dropper_tables(scene.line).items()), ("", None))
+    if hung is None:
+        if on:
+            yield scene.refused(f"effects.{name}", "the line has no droppers")
+    elif on and not hung.residual_stiffness_ratio:
+        why = f"effects.{name} is on and needs a value greater than 0"
+        yield scene.refused(f"{key}.residual_stiffness_ratio", why)
+    elif hung.residual_stiffness_ratio and not on and name not in scene.effects:
+        yield scene.needs_effect(f"{key}.residual_stiffness_ratio", name)
     n = len(scene.train.pantographs)
     if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
         key = "effects.several_pantographs"
@@ -205,12 +206,8 @@ def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
     name = "dropper_lengths"
     given = scene.irregularities.dropper_lengths is not None
     if given and scene.effects.get(name) is not False and not make_line(line).droppers:
-        key = f"irregularities.{name}"
-        yield scene.fault(
-            key,
-            f"changes nothing: the line has no droppers; leave it "
-            f"out, or write effects.{name} = false",
-        )
+        why = "changes nothing: the line has no droppers; leave it out, or write"
+        yield scene.fault(f"irregularities.{name}", f"{why} effects.{name} = false")
 
 
 def _sagging(scene: Scene) -> Iterator[Fault]:

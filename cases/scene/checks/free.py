@@ -17,6 +17,7 @@ from catenary.cases.scene.line.free import (
     FreeSupportsTable,
     FreeWireTable,
 )
+from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import (
     FIXED,
     TENSIONER,
@@ -24,7 +25,6 @@ from catenary.cases.scene.line.line_data import (
     span_lengths,
     stretches_of,
 )
-from catenary.cases.scene.problem import line_data_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import SAME_CUT, Cuts, divisions_of
 from catenary.meshgen.hardware import Clamps
@@ -42,7 +42,11 @@ from catenary.postproc.evaluate.wording import counted
 # Names that mean something else in files and among ends.
 TAKEN = (ANCHORS, "droppers", "clamps", "steady_arms", "masts", "pantographs", TENSIONER, FIXED)
 # Tables of other topologies that have defaults, and would be read by none here.
-_ELSEWHERE = {"support": "a link of type supports", "steady_arm": "a link of type steady_arms"}
+_ELSEWHERE = {
+    "support": "write a link of type supports",
+    "steady_arm": "write a link of type steady_arms",
+    "overlap": "give the wires of both sections stretches_m in line.wires",
+}
 # As many as spans of 20 droppers each on the longest line.
 MOST_DROPPERS = 400_000
 _TINY = 1e-6  # [m]
@@ -51,21 +55,15 @@ _TINY = 1e-6  # [m]
 def check_free_tables(scene: Scene) -> Iterator[Fault]:
     """Names, numbers of spans and supports, and ends that cannot be."""
     for key, instead in _ELSEWHERE.items():
-        if getattr(scene.line, key) != type(getattr(scene.line, key))():
-            why = f"is no part of the topology free; leave it out, and write {instead}"
-            yield Fault(f"line.{key}", f"line.{key} {scene.origin.of(f'line.{key}')} {why}")
-    if scene.line.overlap is not None:
-        key = "line.overlap"
-        yield scene.fault(
-            key,
-            "is no part of the topology free; leave it out, and give "
-            "the wires of both sections stretches_m in line.wires",
-        )
+        if getattr(scene.line, key) != LineTable.model_fields[key].get_default(
+            call_default_factory=True
+        ):
+            why = f"is no part of the topology free; leave it out, and {instead}"
+            yield scene.fault(f"line.{key}", why)
     yield from _names(scene)
     wires = {wire.name: wire for wire in scene.line.wires or []}
     if not any(wire.role == "contact" for wire in wires.values()):
-        key = "line.wires"
-        yield scene.fault(key, "has no wire of the role contact to run under")
+        yield scene.fault("line.wires", "has no wire of the role contact to run under")
     for i, wire in enumerate(scene.line.wires or []):
         yield from _wire(scene, f"line.wires.{i}", wire, wires)
     for i, link in enumerate(scene.line.links or []):
@@ -108,11 +106,8 @@ def _wire(
     for name in ("height_m", "stagger_m"):
         given = getattr(table, name)
         if given is not None and len(given) not in (1, n + 1):
-            yield Fault(
-                f"{key}.{name}",
-                f"{key}.{name} {scene.origin.of(f'{key}.{name}')} must be one number or one for "
-                f"each support ({n + 1}), but lists {len(given)}",
-            )
+            why = f"must be one number or one for each support ({n + 1}), but lists {len(given)}"
+            yield scene.fault(f"{key}.{name}", why)
     beyond = [number for number in table.supports or [] if number > n]
     if beyond:
         why = f"the line has the supports 0 to {n}"
@@ -138,11 +133,8 @@ def _wire(
     needs = table.role != "contact" and not {table.start, table.end} & wires.keys()
     half = table.role != "contact" and not {table.start, table.end} <= wires.keys()
     if (needs or half) and table.height_m is None and table.course_m is None:
-        yield Fault(
-            f"{key}.height_m",
-            f"{key}.height_m ({table.name}) is missing {scene.origin.of(key)}: nothing else says "
-            "how high its ends are held; give height_m or course_m",
-        )
+        why = "nothing else says how high its ends are held; give height_m or course_m"
+        yield scene.missing(f"{key}.height_m", table.name, why, of=key)
 
 
 def _end(
@@ -278,12 +270,11 @@ def droppers_inside(
         yield scene.refused(key, why, value=beyond)
         return
     if kind.positions_m is not None and len(set(spans.values())) > 1:
-        key = f"{table}.positions_m"
         lengths = ", ".join(f"{span:g}" for span in sorted(set(spans.values()))[:_SOME])
         yield scene.fault(
-            key,
-            f"holds for one span length, but the spans are "
-            f"{lengths} m long; give {table}.patterns or count and spacing_m",
+            f"{table}.positions_m",
+            f"holds for one span length, but the spans are {lengths} m long; give {table}.patterns "
+            "or count and spacing_m",
         )
         return
     for number, (positions, _) in hung_in(scene.origin, table, kind, spans).items():
@@ -369,7 +360,7 @@ def free_counts(scene: Scene) -> tuple[int, dict[str, int]]:
     InputError
         If droppers are not declared for one of the span lengths.
     """
-    line = line_data_of(scene)
+    line = scene.line_data
     assert line.wires is not None and line.links is not None
     x = places_of(line)
     cuts = Cuts(x, np.isin(x, line.support_positions), ())
@@ -413,11 +404,8 @@ def _clamped_on(
 
 def _heights(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator[Fault]:
     if wire.heights is None and wire.name in hung(line):
-        yield Fault(
-            f"{key}.height_m",
-            f"{key}.height_m ({wire.name}) is missing {scene.origin.of(key)}: droppers hang this "
-            "wire or supports hold it, at a height that nothing says",
-        )
+        why = "droppers hang this wire or supports hold it, at a height that nothing says"
+        yield scene.missing(f"{key}.height_m", wire.name, why, of=key)
 
 
 def _close(scene: Scene, line: LineData) -> Iterator[Fault]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,19 +12,20 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION
 from catenary.cases.scene.checks.free import free_counts
 from catenary.cases.scene.cost_model import estimate_memory, estimate_start
-from catenary.cases.scene.input.faults import Fault, SceneError
+from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.free import FreeDroppersTable
-from catenary.cases.scene.line.line import LineTable, TransitionTable
+from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import free_wires, overlaps_of, span_lengths
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import divisions_of, find_cuts
-from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Wire
 from catenary.solver.effects import all_effects as effects
 
 # 20 000 spans of ten gaps with ten elements each; their run takes some 7 GB.
 MOST_NODES = 4_000_000
+# Each has two nodes at least.
+MOST_DROPPERS = MOST_NODES // 2
 # From here on a mesh takes longer than one waits without a word.
 MANY_NODES = 50_000
 
@@ -55,35 +56,30 @@ class Size(NamedTuple):
 
 def size_of(scene: Scene) -> Size | None:
     """The size of the mesh that a scene's line will have; None if it brings its own, or if its line
-    cannot be made, which other checks report.
-
-    Counted on a line that has each length of span once: a line of thousands of spans is not made.
-    """
+    cannot be made, which other checks report. Its wires are cut, and not divided."""
     if scene.mesh.file is not None:
         return None
     if scene.line.wires is not None:
         return _of_free_line(scene)
-    lengths = span_lengths(scene.line)
+    overlaps = overlaps_of(scene.line)
+    if overlaps is not None and max(overlaps.first) + overlaps.n_spans >= scene.line.n_spans:
+        return None
     try:
-        sample, times = _sample(scene, lengths)
-        cuts = find_cuts(sample)
-    except (InputError, SceneError):
+        if droppers_of(scene) > MOST_DROPPERS:
+            return None
+        line = line_of(scene)
+        cuts = find_cuts(line)
+    except InputError:
         return None
     gaps = divisions_of(cuts, scene.mesh.elements_per_gap, scene.mesh.support_refinement)
-    masts = sample.support_positions
-    span_of_gap = np.searchsorted(masts, 0.5 * (cuts.x[1:] + cuts.x[:-1])) - 1
-    weighted = gaps * times[span_of_gap]
-    nodes = dict.fromkeys((wire.name for wire in sample.wires), 0)
+    before = np.concatenate([[0], np.cumsum(gaps)])
+    nodes = dict.fromkeys((wire.name for wire in line.wires), 0)
     for piece in cuts.pieces:
         last = piece.first + len(piece.points) - 1
-        # As often as the section that begins there; of less than a span, as the support it goes by.
-        whole = piece.points[-1, 0] - piece.points[0, 0] >= min(lengths)
-        often = times[span_of_gap[piece.first if whole else last - 1]]
-        nodes[piece.wire] += int(weighted[piece.first : last].sum() + often)
-    hanging = np.searchsorted(masts, sample.dropper_x) - 1
-    together = () if scene.switches()[RELATIVE_MOTION] else {one for one, _ in sample.twins}
-    own = [wire for wire in sample.wires if wire.name not in together]
-    return _size(scene, int(times[hanging].sum()), nodes, own)
+        nodes[piece.wire] += int(before[last] - before[piece.first]) + 1
+    together = () if scene.switches()[RELATIVE_MOTION] else {one for one, _ in line.twins}
+    own = [wire for wire in line.wires if wire.name not in together]
+    return _size(scene, line.dropper_x.size, nodes, own)
 
 
 def _of_free_line(scene: Scene) -> Size | None:
@@ -119,53 +115,27 @@ def kinds_by_number(table: LineTable) -> int:
     return len(patterns) if any(pattern.spans for pattern in patterns) else 0
 
 
-def _sample(scene: Scene, lengths: tuple[float, ...]) -> tuple[Line, np.ndarray]:
-    """A line of the first span, one span of each length, the spans of each kind of overlap, and the
-    last span; how often each of these is in the line of the scene.
+def droppers_of(scene: Scene) -> int:
+    """Number of droppers of a scene's line, whose wires are not made.
 
     Raises
     ------
     InputError
-        If there is no such line.
+        If they are not declared for one of the span lengths.
     """
-    table, n = scene.line, len(lengths)
-    if kinds_by_number(table):
-        return line_of(scene), np.ones(n, dtype=int)
-    overlaps = overlaps_of(table)
-    inner = Counter(lengths[1:-1])
-    kinds: Counter[tuple[float, ...]] = Counter()
-    if overlaps is not None:
-        both = [range(first, first + overlaps.n_spans) for first in overlaps.first]
-        if any(ahead.stop >= n for ahead in both):
-            raise InputError("line.overlap.first_span is beyond the line")
-        kinds = Counter(tuple(lengths[i] for i in spans) for spans in both)
-        inner -= Counter(length for kind, often in kinds.items() for length in kind * often)
-    kept: list[float] = []
-    numbers: list[int] = []
-    first_spans: list[int] = []
-    for kind, often in kinds.items():
-        first_spans.append(2 + len(inner) + len(kept))
-        # A span of no weight parts it from the next overlap.
-        kept += [*kind, kind[-1]]
-        numbers += [*(often for _ in kind), 0]
-    spans = [lengths[0], *inner, *kept, lengths[-1]][: n + len(kinds)]
-    changes: dict[str, Any] = {
-        "n_spans": len(spans),
-        "span_m": spans,
-        "transition": TransitionTable(),
-        "stagger_m": [0.0],
-        "messenger_stagger_m": None,
-    }
-    if table.overlap is not None:
-        alike = {"first_span": first_spans, "repeat_every_spans": None}
-        changes["overlap"] = table.overlap.model_copy(update=alike)
-    sample = scene.model_copy(update={"line": table.model_copy(update=changes)})
-    return line_of(sample), np.array([1, *inner.values(), *numbers, 1])
+    data = scene.line_data
+    auxiliary = () if data.auxiliary_wire is None else data.auxiliary_wire.dropper_positions
+    return sum(map(len, (*data.dropper_positions, *auxiliary)))
 
 
 def size_faults(scene: Scene) -> Iterator[Fault]:
-    """A fault if the mesh has more than ``MOST_NODES``."""
+    """A fault if there are more than ``MOST_DROPPERS``, or if the mesh has more than
+    ``MOST_NODES``."""
     size = size_of(scene)
+    with suppress(InputError):  # which other checks report
+        if size is None and (n := droppers_of(scene)) > MOST_DROPPERS:
+            why = f"its spans have {n} droppers, and at most {MOST_DROPPERS} are allowed"
+            yield scene.refused("line.n_spans", why)
     if size is not None and size.nodes > MOST_NODES:
         key = "line.n_spans"
         yield Fault(

@@ -102,9 +102,8 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
     ends = [table.ends.start.along, table.ends.end.along]
     ends += [] if table.overlap is None else [table.overlap.along]
     if TENSIONER not in ends and not _ends_of_free_wires(table):
-        key = "line.tensioner"
         yield scene.fault(
-            key,
+            "line.tensioner",
             f"has {', '.join(sorted(given))}, but no wire ends at a "
             "tensioner: line.ends.start.along or line.ends.end.along must be tensioner"
             + (", or start or end of a wire of line.wires" if table.wires else ""),

@@ -14,7 +14,12 @@ from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.problem import end_of, pantograph_of, strips_ahead
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.train.mechanism import ActuatorTable
-from catenary.cases.scene.train.pantograph import LumpedTable, MultibodyTable, wanted_force
+from catenary.cases.scene.train.pantograph import (
+    LumpedTable,
+    MultibodyTable,
+    PantographTable,
+    wanted_force,
+)
 from catenary.cases.scene.train.train import MotionTable, vehicle_of
 from catenary.mbs.rigid.bodies import SPACE
 from catenary.meshgen.topologies.line_data import LineData
@@ -41,6 +46,14 @@ def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
         yield from _strip_lengths(scene, line)
 
 
+def _kinds(scene: Scene) -> dict[str, PantographTable]:
+    """Tables of the kinds of pantograph that are on the train, by their names, leading one first.
+
+    Names have no fault.
+    """
+    return {place.name: scene.pantographs[place.name] for place in scene.train.pantographs}
+
+
 def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
     on, is_given = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
     if scene.vehicle is None:
@@ -49,30 +62,22 @@ def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
         yield _idle(scene, "vehicle", "vehicle_motion")
     acts = any(scene.switches()[name] for name in ("head_roll", "lateral_motion"))
     if on and scene.vehicle.lateral is not None and not acts:
-        key = "vehicle.lateral"
         yield scene.fault(
-            key,
-            "moves the wire along the strips, which acts only with "
-            "effects.head_roll = true or effects.lateral_motion = true",
+            "vehicle.lateral",
+            "moves the wire along the strips, which acts only with effects.head_roll = true or "
+            "effects.lateral_motion = true",
         )
 
 
 def _roll_acts(scene: Scene) -> Iterator[Fault]:
     on, is_given = scene.switches()["head_roll"], "head_roll" in scene.effects
-    speed = scene.train.speed_km_h
-    names = list(dict.fromkeys(place.name for place in scene.train.pantographs))
-    for name in names:
-        kind = scene.pantographs[name]
-        if isinstance(kind, LumpedTable) and kind.roll is not None and not on and not is_given:
+    for name, kind in _kinds(scene).items():
+        if not on and isinstance(kind, LumpedTable) and kind.roll is not None and not is_given:
             yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
-    if not on:
-        return
-    rolling = [name for name in names if pantograph_of(name, scene.pantographs[name], speed).roll]
-    for name in rolling:
-        if scene.pantographs[name].strips.length_m is None:
-            why = (
-                f"it needs pantographs.{name}.strips.length_m, the strip that the wire moves along"
-            )
+        rolls = on and pantograph_of(name, kind, scene.train.speed_km_h).roll
+        if rolls and kind.strips.length_m is None:
+            strip = f"pantographs.{name}.strips.length_m"
+            why = f"it needs {strip}, the strip that the wire moves along"
             yield scene.refused("effects.head_roll", why)
 
 
@@ -83,8 +88,7 @@ def _idle(scene: Scene, key: str, effect: str) -> Fault:
 
 
 def _multibody_strips(scene: Scene) -> Iterator[Fault]:
-    for name in dict.fromkeys(place.name for place in scene.train.pantographs):
-        kind = scene.pantographs[name]
+    for name, kind in _kinds(scene).items():
         if not isinstance(kind, MultibodyTable) or kind.strips.mass_kg is None:
             continue
         from catenary.mbs.mechanism.multibody_pantograph import stand
@@ -117,11 +121,10 @@ def _tables_reach(scene: Scene) -> Iterator[Fault]:
                 continue
             first, last = pairs[0][0], pairs[-1][0]
             if first > low + _TINY or last < high - _TINY:
-                key = f"vehicle.{direction}.{name}"
                 yield scene.fault(
-                    key,
-                    f"holds from {first:g} to {last:g} {unit}, but "
-                    f"the run needs it from {low:g} to {high:.5g} {unit}",
+                    f"vehicle.{direction}.{name}",
+                    f"holds from {first:g} to {last:g} {unit}, but the run needs it from {low:g} "
+                    f"to {high:.5g} {unit}",
                 )
 
 
@@ -200,8 +203,7 @@ _LEADS = 0.05
 
 def check_pantographs(scene: Scene) -> Iterator[Fault]:
     """Names and forces that are wrong with a kind of pantograph."""
-    on_the_train = {place.name for place in scene.train.pantographs}
-    yield from _static_forces(scene, on_the_train)
+    yield from _static_forces(scene)
     for name, table in scene.pantographs.items():
         if isinstance(table, MultibodyTable):
             yield from _names(scene, name, table)
@@ -214,19 +216,20 @@ def check_mechanisms(scene: Scene, line: LineData) -> Iterator[Fault]:
 
     The machinery of multibody systems is imported here, for scenes that have a mechanism.
     """
-    on_the_train = {place.name for place in scene.train.pantographs}
     found: list[Fault] = []
-    for name, table in scene.pantographs.items():
-        if name in on_the_train and isinstance(table, MultibodyTable):
-            found += _mechanism(scene, name, table)
+    for name, table in _kinds(scene).items():
+        if isinstance(table, MultibodyTable):
+            try:
+                _standing(scene, name, table)
+            except (InputError, RunBroken) as error:
+                found.append(scene.fault(f"pantographs.{name}", f"cannot be built: {error}"))
     yield from found or _heights(scene, line)
 
 
 def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
     lowest = line.lowest_contact
     heights = lowest, line.contact_height
-    for name in dict.fromkeys(place.name for place in scene.train.pantographs):
-        table = scene.pantographs[name]
+    for name, table in _kinds(scene).items():
         if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
             continue
         data, working = _standing(scene, name, table)
@@ -283,15 +286,12 @@ def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
     key = f"pantographs.{kind}"
     bodies = list(table.bodies)
     if SPACE in bodies:
-        yield _refusal(
-            scene, f"{key}.bodies.{SPACE}", "is the name of the frame at rest; choose another"
-        )
+        why = "is the name of the frame at rest; choose another"
+        yield scene.fault(f"{key}.bodies.{SPACE}", why)
     for role in ("head", "arm"):
         yield from scene.among(f"{key}.{role}", bodies)
     if table.head == table.arm:
-        yield _refusal(
-            scene, f"{key}.head", f"is {shown(table.head)} as the arm is; they are two bodies"
-        )
+        yield scene.refused(f"{key}.head", "the arm is this body too; they are two")
     if table.actuator is not None:
         yield from scene.among(f"{key}.actuator", list(table.forces))
     for place in _uses(table):
@@ -301,10 +301,10 @@ def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
     for what in ("joints", "forces"):
         for label, one in getattr(table, what).items():
             if getattr(one, "i", None) == getattr(one, "j", SPACE):
-                yield _refusal(scene, f"{key}.{what}.{label}", f"has {shown(one.i)} on both sides")
+                yield scene.fault(f"{key}.{what}.{label}", f"has {shown(one.i)} on both sides")
     for label in table.forces:
         if label in table.joints or label == "gravity":
-            yield _refusal(scene, f"{key}.forces.{label}", "has the name of a joint or of gravity")
+            yield scene.fault(f"{key}.forces.{label}", "has the name of a joint or of gravity")
 
 
 def _uses(table: MultibodyTable) -> Iterator[str]:
@@ -328,10 +328,10 @@ def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]
         yield scene.refused(key, why)
 
 
-def _static_forces(scene: Scene, on_the_train: set[str]) -> Iterator[Fault]:
+def _static_forces(scene: Scene) -> Iterator[Fault]:
     speed = scene.train.speed_km_h
-    for name, table in scene.pantographs.items():
-        if name not in on_the_train or table.static_force_by_speed is None:
+    for name, table in _kinds(scene).items():
+        if table.static_force_by_speed is None:
             continue
         if wanted_force(table, speed) is None:
             first, last = table.static_force_by_speed[0][0], table.static_force_by_speed[-1][0]
@@ -342,18 +342,6 @@ def _static_forces(scene: Scene, on_the_train: set[str]) -> Iterator[Fault]:
                 f"{key} is {speed:g} km/h {scene.origin.of(key)}; "
                 f"pantographs.{name}.static_force_by_speed only holds forces for {held}",
             )
-
-
-def _mechanism(scene: Scene, name: str, table: MultibodyTable) -> Iterator[Fault]:
-    try:
-        _standing(scene, name, table)
-    except (InputError, RunBroken) as error:
-        key = f"pantographs.{name}"
-        yield scene.fault(key, f"cannot be built: {error}")
-
-
-def _refusal(scene: Scene, key: str, sentence: str) -> Fault:
-    return Fault(key, f"{key} {sentence} {scene.origin.of(key)}")
 
 
 def check_laws(scene: Scene) -> Iterator[Fault]:

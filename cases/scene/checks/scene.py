@@ -7,7 +7,7 @@ left out; all others go on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.keys.usual_values import USUAL, unit_guess
-from catenary.cases.scene.problem import end_of, line_data_of, strips_ahead
+from catenary.cases.scene.problem import end_of, strips_ahead
 from catenary.cases.scene.run.case import chosen_books
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.slowest_wave import bends, slowest_wave
@@ -47,19 +47,16 @@ MIN_SEPARATION = 1.0
 _TINY = 1e-6
 
 
-def check(scene: Scene, changed: Collection[str] | None = None) -> None:
-    """Raise ``UnfitScene`` with all in which a scene contradicts itself.
-
-    ``changed`` are names of tables in which it differs from a sound scene, None without one.
-    """
-    faults = faults_of(scene, changed)
+def check(scene: Scene) -> None:
+    """Raise ``UnfitScene`` with all in which a scene contradicts itself."""
+    faults = faults_of(scene)
     if faults:
         raise UnfitScene(faults)
 
 
-def faults_of(scene: Scene, changed: Collection[str] | None = None) -> list[Fault]:
-    """All in which a scene contradicts itself; ``changed`` as of ``check``."""
-    found = _Findings(changed)
+def faults_of(scene: Scene) -> list[Fault]:
+    """All in which a scene contradicts itself."""
+    found = _Findings()
     whole = found.collect(topology.check_topology, scene)
     for of_tables in _OF_TABLES:
         found.collect(of_tables, scene)
@@ -68,7 +65,7 @@ def faults_of(scene: Scene, changed: Collection[str] | None = None) -> list[Faul
         found.collect(pantographs.check_laws, scene)
     # A scene that is too large is not made; consequences of a wrong unit are not reported.
     sound = not whole or found.collect(mesh_size.size_faults, scene)
-    sound = sound and found.collect(usual_faults, scene, changed)
+    sound = sound and found.collect(usual_faults, scene)
     line = _line(scene, found) if sound and whole else None
     if line is None:
         return found.faults
@@ -111,16 +108,12 @@ def faults_of(scene: Scene, changed: Collection[str] | None = None) -> list[Faul
 
 @dataclass
 class _Findings:
-    """Faults that checks have found so far; ``changed`` as of ``check``."""
+    """Faults that checks have found so far."""
 
-    changed: Collection[str] | None
     faults: list[Fault] = field(default_factory=list)
 
     def collect(self, check: Callable[..., Iterator[Fault]], *of: Any) -> bool:
         """Collect the faults that a check finds; True if there are none."""
-        read = READS.get(check)
-        if read is not None and self.changed is not None and read.isdisjoint(self.changed):
-            return True
         before = len(self.faults)
         try:
             self.faults.extend(check(*of))
@@ -133,17 +126,14 @@ class _Findings:
 
 def _line(scene: Scene, found: _Findings) -> LineData | None:
     """The line of a scene, None if its droppers do not fit into its spans."""
-    lines: list[LineData] = []
-
-    def make() -> Iterator[Fault]:
-        lines.append(line_data_of(scene))
-        return iter(())
-
-    if not found.collect(make):
+    try:
+        line = scene.line_data
+    except InputError as error:
+        found.faults.append(Fault("", str(error)))
         return None
     checks = topology.check_droppers_inside_spans, free.check_free_droppers
-    inside = [found.collect(of_line, scene, lines[0]) for of_line in checks]
-    return lines[0] if all(inside) else None
+    inside = [found.collect(of_line, scene, line) for of_line in checks]
+    return line if all(inside) else None
 
 
 def _test_keys(scene: Scene) -> Iterator[Fault]:
@@ -221,11 +211,11 @@ def _running(scene: Scene, line: LineData) -> Iterator[Fault]:
     given = scene.train.end_m
     if given is not None and given > last + _TINY:
         yield scene.refused("train.end_m", f"it must lie inside the line: {inside}")
-    if end <= start:
-        if given is None:
-            yield scene.refused("train.start_m", f"it must lie before the end at {end:g} m")
+    if end <= start and given is None:
+        yield scene.refused("train.start_m", f"it must lie before the end at {end:g} m")
+    elif end <= start:
         yield scene.refused("train.end_m", f"it must be greater than train.start_m ({start:g} m)")
-    if end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
+    elif end - start < scene.train.speed_km_h / 3.6 * scene.numerics.dt_s:
         yield scene.refused("numerics.dt_s", "the run would have no step at all")
 
 
@@ -333,16 +323,14 @@ def check_recorded_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
 _MEANT = ", or case.accept_unusual = true if it is meant"
 
 
-def usual_faults(scene: Scene, changed: Collection[str] | None = None) -> Iterator[Fault]:
+def usual_faults(scene: Scene) -> Iterator[Fault]:
     """A fault for every number that was probably written in another unit.
 
-    None in a scene that says with ``case.accept_unusual`` that its numbers are meant. ``changed``
-    as of ``check``.
+    None in a scene that says with ``case.accept_unusual`` that its numbers are meant.
     """
     if scene.case.accept_unusual:
         return
-    new = None if changed is None or "case" in changed else set(changed)
-    plain = scene.model_dump(exclude_none=True, include=new)
+    plain = scene.model_dump(exclude_none=True)
     ranges = [key for key, usual in USUAL.items() if usual.least is not None]
     for pattern in ranges:
         yield from _faults(plain, pattern.split("."), "", scene.origin)
@@ -367,13 +355,6 @@ def _faults(value: Any, parts: list[str], key: str, origin: Origin) -> Iterator[
             return
 
 
-# Checks that take long, with all tables that their faults depend on.
-READS: dict[Callable[..., Iterator[Fault]], frozenset[str]] = {
-    mesh_size.size_faults: frozenset({"line", "mesh", "irregularities", "window", "effects"}),
-    topology.check_droppers_inside_spans: frozenset({"line"}),
-    topology.check_dropper_lengths: frozenset({"line"}),
-    defects.check_defects: frozenset({"line", "irregularities", "defects", "incidents"}),
-}
 # Checks that need no other one.
 _OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
     _test_keys,

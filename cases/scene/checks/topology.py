@@ -29,20 +29,15 @@ def check_topology(scene: Scene) -> Iterator[Fault]:
     needed = _keys(known[table.topology].parts)
     for name in needed:
         if getattr(table, name) is None:
-            key = f"line.{name}"
             meaning = LineTable.model_fields[name].description
-            yield Fault(key, f"{key} ({meaning}) is missing {scene.origin.of(key)}")
+            yield scene.missing(f"line.{name}", meaning or "")
     takes = {name: {**_keys(entry.parts), **_keys(entry.may)} for name, entry in known.items()}
     every = {name for keys in takes.values() for name in keys}
     for name in sorted(every - takes[table.topology].keys()):
         if getattr(table, name) is not None:
-            key = f"line.{name}"
-            users = [one for one, keys in takes.items() if name in keys]
-            yield scene.fault(
-                key,
-                f"is no part of the topology {table.topology}; leave "
-                f"it out, or take line.topology = {' or '.join(users)}",
-            )
+            users = " or ".join(one for one, keys in takes.items() if name in keys)
+            why = f"is no part of the topology {table.topology}; leave it out, or take"
+            yield scene.fault(f"line.{name}", f"{why} line.topology = {users}")
     if table.topology == FREE and table.wires is not None and table.links is not None:
         yield from check_free_tables(scene)
 

@@ -28,12 +28,12 @@ def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
 
 def unknown_key(key: str, where: str, known: Sequence[str]) -> str:
     """The sentence for an unknown key, written at ``where``, with the nearest of the ``known``."""
-    near = nearest(key, known)
+    near, name = nearest(key, known), shown(key)[1:-1] or '""'
     if key.startswith("petsc."):
         hint = f"; did you mean {near}?" if near and near.startswith("petsc.") else ""
-        return f"{shown(key)[1:-1]} {where} {ELSEWHERE}{hint}"
+        return f"{name} {where} {ELSEWHERE}{hint}"
     hint = f"; did you mean {near}?" if near else "; see `catenary list --keys` for all keys"
-    return f"{shown(key)[1:-1]} {where} is unknown{hint}"
+    return f"{name} {where} is unknown{hint}"
 
 
 def _or(listed: str) -> str:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from catenary.base.options import option
 
@@ -66,10 +66,19 @@ def together(table: Table, *names: str) -> None:
         )
 
 
-def stretch(start: float, end: float) -> None:
-    """Raise ``ValueError`` unless ``to_m`` lies behind ``from_m``."""
-    if end <= start:
-        raise ValueError(f"must end behind its start, but to_m is {end:g} and from_m {start:g}")
+class StretchTable(Table):
+    """A stretch of the line, whose end lies behind its start."""
+
+    from_m: float
+    to_m: float
+
+    @model_validator(mode="after")
+    def _has_length(self) -> Self:
+        if self.to_m <= self.from_m:
+            raise ValueError(
+                f"must end behind its start, but to_m is {self.to_m:g} and from_m {self.from_m:g}"
+            )
+        return self
 
 
 def band(shortest: float, longest: float) -> None:

@@ -186,11 +186,13 @@ def usual_range(key: str) -> tuple[float, float] | None:
 
 def unit_guess(key: str, value: float) -> str:
     """The sentence on a number whose unit is probably another one, "" for others."""
-    usual, unit = usual_range(key), unit_of(key)
+    usual = usual_range(key)
     # Sideways and below there are negative numbers, of which only the size can be a slip.
-    signed = any(part.startswith(_SIGNED) for part in key.split("."))
-    size = abs(value) if signed else value
-    if usual is None or size <= 0 or usual[0] / _MARGIN <= size <= usual[1] * _MARGIN:
+    size = abs(value)
+    if usual is None or not size or usual[0] / _MARGIN <= size <= usual[1] * _MARGIN:
+        return ""
+    unit, signed = unit_of(key), any(part.startswith(_SIGNED) for part in key.split("."))
+    if value < 0 and not signed:
         return ""
     for others, factor in ((_LARGER, 1e3), (_SMALLER, 1e-3)):
         if unit in others and usual[0] <= size * factor <= usual[1]:

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import PAIR, Table, WireName, band, given, not_with, within
+from catenary.cases.scene.keys.table import (
+    PAIR,
+    StretchTable,
+    Table,
+    WireName,
+    band,
+    given,
+    not_with,
+    within,
+)
 from catenary.cases.scene.keys.units import angle_from_deg, length_from_mm
 from catenary.meshgen.line import Line
 from catenary.solver.problem import defects as solver
@@ -170,7 +179,7 @@ class LooseClampTable(DropperDefectTable):
     type: Literal["loose_clamp"] = Field(description="kind of defect")
 
 
-class WornWireTable(Table):
+class WornWireTable(StretchTable):
     """A wire that has lost a part of its section over a stretch, from below."""
 
     type: Literal["worn_wire"] = Field(description="kind of defect")
@@ -178,15 +187,6 @@ class WornWireTable(Table):
     from_m: Place = Field(description="where the stretch begins along the line")
     to_m: Place = Field(description="where it ends")
     lost_share: float = Field(gt=0, le=0.5, description="share of the section that is lost")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> WornWireTable:
-        if self.to_m <= self.from_m:
-            raise ValueError(
-                f"must have to_m greater than from_m, but they are {self.to_m:g} and "
-                f"{self.from_m:g} m"
-            )
-        return self
 
 
 class WrongTensionTable(Table):

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import OneOrMore, Table, stretch, take_away, together
+from catenary.cases.scene.keys.table import OneOrMore, StretchTable, Table, take_away, together
 from catenary.cases.scene.line.droppers import DropperTable, Span
 from catenary.cases.scene.line.ends import EndsTable, OverlapTable, TemperatureTable, TensionerTable
 from catenary.cases.scene.line.free import FreeLinkTable, FreeWireTable
@@ -71,7 +71,7 @@ class CurveTable(Table):
         return self
 
 
-class TunnelTable(Table):
+class TunnelTable(StretchTable):
     """A tunnel: aerodynamic forces on pantographs are larger in it, and there is no wind."""
 
     from_m: float = Field(ge=0, le=1e6, description="place of its first portal")
@@ -82,11 +82,6 @@ class TunnelTable(Table):
     portal_m: float = Field(
         20.0, ge=0, le=1000, description="length behind each portal in which they change"
     )
-
-    @model_validator(mode="after")
-    def _has_length(self) -> TunnelTable:
-        stretch(self.from_m, self.to_m)
-        return self
 
 
 class TransitionTable(Table):

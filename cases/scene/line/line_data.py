@@ -352,8 +352,7 @@ def along_of(table: LineTable) -> AlongTrack:
 
 def hanging_table(table: LineTable) -> DropperTable | None:
     """The table that says what slack droppers do; of a free line that of its first droppers."""
-    links = (link for link in table.links or [] if isinstance(link, FreeDroppersTable))
-    return table.dropper or next(links, None)
+    return next(iter(dropper_tables(table).values()), None)
 
 
 def wire_tables(table: LineTable) -> dict[str, WireTable]:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import Table, either
+from catenary.cases.scene.keys.table import StretchTable, Table, either
 from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 from catenary.postproc.record.snapshots.field_kinds import FIELDS, USUAL_FIELDS
 from catenary.postproc.standards.book import RuleBook
@@ -57,7 +57,7 @@ class LimitsTable(Table):
     contact_wire_strain_um_per_m: float | None = _limit("contact_wire_strain_um_per_m", 1e6)
 
 
-class EvaluationTable(Table):
+class EvaluationTable(StretchTable):
     """The stretch whose statistics are judged, and by what."""
 
     from_m: float = Field(ge=0, le=1e6, description="start of the evaluated stretch")
@@ -79,14 +79,6 @@ class EvaluationTable(Table):
         None, description="edition of EN 50367, in place of rules"
     )
     system: str = Field("ac", description="power supply, which decides the mean force allowed")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> EvaluationTable:
-        if self.to_m <= self.from_m:
-            raise ValueError(
-                f"must end after it starts, but from_m is {self.from_m:g} and to_m {self.to_m:g}"
-            )
-        return self
 
     @property
     def chosen(self) -> list[str]:

@@ -12,7 +12,14 @@ from pydantic import (
     model_validator,
 )
 
-from catenary.cases.scene.keys.table import Table, given, not_with, take_away, together
+from catenary.cases.scene.keys.table import (
+    Table,
+    either,
+    given,
+    not_with,
+    take_away,
+    together,
+)
 from catenary.solver.problem.integrator_parameters import (
     AVERAGE_ACCELERATION,
     HHT,
@@ -225,7 +232,7 @@ class WindowTable(Table):
         there = given(self, "tolerance", *_SPANS)
         if self.mode != "bounded" and there:
             raise not_with(there[0], f"with mode {self.mode}, but with bounded only")
-        if "tolerance" in there and len(there) > 1:
-            raise ValueError(f"takes tolerance or {there[1]}, but both are given{take_away()}")
+        for key in _SPANS:
+            either(self, "tolerance", key)
         together(self, *_SPANS)
         return self

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from catenary.cases.scene.keys.table import Table, stretch, take_away
+from catenary.cases.scene.keys.table import StretchTable, Table, either
 from catenary.cases.scene.keys.units import angle_from_deg
 from catenary.solver.problem.wind import Gusts, Profile, Stretch, Wind, friction_velocity_of
 
@@ -14,7 +14,7 @@ from catenary.solver.problem.wind import Gusts, Profile, Stretch, Wind, friction
 MOST_HZ = 20.0
 
 
-class WindStretchTable(Table):
+class WindStretchTable(StretchTable):
     """A part of the line that is more exposed, such as a viaduct, or sheltered."""
 
     from_m: float = Field(ge=0, le=1e6, description="where it begins")
@@ -25,11 +25,6 @@ class WindStretchTable(Table):
     height_m: float | None = Field(
         None, ge=1, le=300, description="height of the wires above ground there"
     )
-
-    @model_validator(mode="after")
-    def _has_length(self) -> WindStretchTable:
-        stretch(self.from_m, self.to_m)
-        return self
 
 
 class GustsTable(Table):
@@ -64,11 +59,7 @@ class GustsTable(Table):
 
     @model_validator(mode="after")
     def _consistent(self) -> GustsTable:
-        if self.turbulence_intensity is not None and self.friction_velocity_m_per_s is not None:
-            raise ValueError(
-                "must have turbulence_intensity or friction_velocity_m_per_s, but both are given"
-                f"{take_away()}"
-            )
+        either(self, "turbulence_intensity", "friction_velocity_m_per_s")
         if self.highest_hz <= self.lowest_hz:
             raise ValueError(
                 f"must have frequencies, but lowest_hz is {self.lowest_hz:g} and highest_hz "

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import Table, ascending, exactly_one
+from catenary.cases.scene.keys.table import Table, ascending, either, exactly_one
 from catenary.cases.scene.train.head import SomeInertia, SomeMass
 from catenary.mbs.rigid.bodies import SPACE
 
@@ -183,8 +183,7 @@ class SpringDamperTable(_Pair):
 
     @model_validator(mode="after")
     def _one_spring(self) -> SpringDamperTable:
-        if self.pull_by_extension is not None and self.stiffness_N_per_m:
-            raise ValueError("must have stiffness_N_per_m or pull_by_extension, but both are given")
+        either(self, "stiffness_N_per_m", "pull_by_extension")
         return self
 
 

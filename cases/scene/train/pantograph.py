@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.toml_input import assign
+from catenary.cases.scene.input.toml_input import assign, value_at
 from catenary.cases.scene.keys.table import Table, ascending, exactly_one, given, not_with
 from catenary.cases.scene.train.head import RollTable, SomeMass, StripsTable
 from catenary.cases.scene.train.laws import AerodynamicsTable, LawTable, RegulationTable
@@ -241,8 +241,13 @@ class MultibodyTable(_Pressing):
                     key,
                     "with motion = reduced, because it acts only with motion = all_bodies",
                 )
-        for correction in self.corrections:
-            _number_at(self, correction.key)
+        plain = self.model_dump() if self.corrections else {}
+        for key in (correction.key for correction in self.corrections):
+            value = value_at(plain, key)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise ValueError(
+                    f"must name numbers of this pantograph in its corrections, but {key} is none"
+                )
         if self.as_published and not self.corrections:
             raise ValueError("must list corrections if as_published is true")
         return self
@@ -273,26 +278,6 @@ class MultibodyTable(_Pressing):
             first = failed.errors()[0]
             key = ".".join(str(part) for part in first["loc"])
             raise InputError(f"the published {key} is not allowed: {first['msg']}") from failed
-
-
-def _number_at(table: Table, key: str) -> float:
-    """The number that a dotted key names; raises ValueError if there is none."""
-    here: Any = table
-    for part in key.split("."):
-        if isinstance(here, Table) and part in type(here).model_fields:
-            here = getattr(here, part)
-        elif isinstance(here, dict) and part in here:
-            here = here[part]
-        elif isinstance(here, list | tuple) and part.isdecimal() and int(part) < len(here):
-            here = here[int(part)]
-        else:
-            here = None
-            break
-    if isinstance(here, bool) or not isinstance(here, int | float):
-        raise ValueError(
-            f"must name numbers of this pantograph in its corrections, but {key} is none"
-        )
-    return float(here)
 
 
 def _kind(raw: Any) -> Any:

@@ -28,7 +28,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.faults import Origin, shown
 from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
-from catenary.cases.scene.load import Shared, scene_from
+from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import line_of, problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sweep.variants import check_key, is_number
@@ -120,11 +120,6 @@ class Parameter:
         return bool(_OF_DROPPER.fullmatch(self.key))
 
     @property
-    def tables(self) -> set[str]:
-        """Tables of a scene that a change of it changes: a shape takes effect as well."""
-        return {self.key.split(".")[0]} | ({"effects"} if self.is_of_shape else set())
-
-    @property
     def is_of_train(self) -> bool:
         """Whether it leaves the line at rest as it is."""
         return self.key.split(".")[0] in _OF_TRAIN
@@ -176,13 +171,10 @@ class ChangedScenes:
 
     def all_changed(self, changes: Sequence[tuple[Parameter, float]]) -> Scene:
         """The scene with several parameters changed, each by a number."""
-        changed = {table for parameter, _ in changes for table in parameter.tables}
-        raw = self._raw | {name: copy.deepcopy(self._raw.get(name, {})) for name in changed}
+        raw = copy.deepcopy(self._raw)
         for parameter, by in changes:
             _change(raw, self.scene, parameter, by)
-        # What is read from files may be otherwise now.
-        is_sound = not self.scene.origin.taken_in
-        return self._checked(raw, Shared(self.scene, changed) if is_sound else None)
+        return self._checked(raw)
 
     def rest(self, parameter: Parameter, by: float) -> LineAtRest:
         """The line at rest with all values of a parameter changed ``by`` a number.
@@ -359,8 +351,8 @@ class ChangedScenes:
         return tuple(values) if values and all(map(is_number, values)) else None
 
     @staticmethod
-    def _checked(raw: dict[str, Any], shared: Shared | None = None) -> Scene:
-        return scene_from(raw, Origin("the scene", (), recorded=True), Path.cwd(), shared)
+    def _checked(raw: dict[str, Any]) -> Scene:
+        return scene_from(raw, Origin("the scene", (), recorded=True), folder=Path.cwd())
 
 
 def _change(raw: dict[str, Any], scene: Scene, parameter: Parameter, by: float) -> None:

@@ -73,7 +73,7 @@ ASSIGNMENTS = {
         "incidents.0.dropper is 3 on the command line (--set); defects.0 lets this one carry",
     ),
     "no such wire": (["defects.2.wire=third_rail"], "the line has contact_wire, messenger_wire"),
-    "worn backwards": (["defects.2.to_m=300"], "must have to_m greater than from_m"),
+    "worn backwards": (["defects.2.to_m=300"], "must end behind its start, but to_m is 300"),
     "worn beyond the line": (["defects.2.to_m=2000"], "contact_wire runs from 0 to 1320 m"),
     "worn away": (["defects.2.lost_share=0.6"], "must be at most 0.5"),
     "worn twice": (

@@ -48,7 +48,7 @@ ASSIGNMENTS = {
         f'{KIND}.joints.slide.i is "must" on the command line (--set); did you mean mast?',
     ),
     "unknown body of a force": ([f"{KIND}.forces.brake.j=nothing"], "one of mast, head, space"),
-    "head is arm": ([f"{KIND}.head=mast"], "as the arm is"),
+    "head is arm": ([f"{KIND}.head=mast"], "the arm is this body too; they are two"),
     "joint of one body": ([f"{KIND}.joints.slide.i=head"], 'has "head" on both sides'),
     "uplift twice": (
         [f"{KIND}.aerodynamics={{uplift_polynomial=[1], uplift_by_speed=[[0, 0], [300, 80]]}}"],
@@ -100,7 +100,7 @@ ASSIGNMENTS = {
     "wind of no speed": (["wind.height_m=6"], "wind.speed_m_per_s (mean speed"),
     "two strengths of gusts": (
         ["wind={speed_m_per_s=20, gusts={turbulence_intensity=0.2, friction_velocity_m_per_s=2}}"],
-        "must have turbulence_intensity or friction_velocity_m_per_s, but both are given",
+        "takes turbulence_intensity or friction_velocity_m_per_s, but both are given",
     ),
     "no frequencies": (
         ["wind={speed_m_per_s=20, gusts={lowest_hz=0.5, highest_hz=0.2}}"],

@@ -248,7 +248,7 @@ ASSIGNMENTS = {
         "only holds forces for 275 to 320 km/h",
     ),
     "another model": (["pantographs.reference.type=multibdy"], "must be"),
-    "evaluation backwards": (["evaluation.to_m=400"], "must end after it starts"),
+    "evaluation backwards": (["evaluation.to_m=400"], "must end behind its start"),
     "evaluation beyond the line": (["evaluation.to_m=1500"], "only runs from 90 to 1320 m"),
     "evaluation before the start": (["evaluation.from_m=50"], "only runs from 90"),
     "raised too late": (["train.raise_time_s=10"], "must be raised by then"),

@@ -285,8 +285,8 @@ def test_what_broke_is_continued_as_soon_as_no_run_reads_it(
     with pytest.raises(catenary.InputError, match="no picture of statistics. No statistics of"):
         run.plot.statistics()
     run.close()
-    with pytest.raises(catenary.RunBroken, match="iterations"):
-        catenary.restart(tmp_path / "run", report=False)
+    with pytest.raises(catenary.RunBroken, match="iterations"):  # its file stands for the folder
+        catenary.restart(tmp_path / "run/run.h5", report=False)
 
 
 @pytest.mark.parametrize("swept", [False, True])
