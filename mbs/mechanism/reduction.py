@@ -55,15 +55,7 @@ class ReducedMechanism:
     blown: np.ndarray | None = None
 
     def at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
-        """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre.
-
-        Raises
-        ------
-        RunBroken
-            The height is not within the tables.
-        """
-        if not self.heights[0] <= height <= self.heights[-1]:
-            raise self.left(height)
+        """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre."""
         values, slopes = self._tables_at_rest.at(height)
         return values[:3], slopes[:3]
 
