@@ -44,7 +44,8 @@ def _strips_of(strips: Strips) -> str:
     text += f" of {own.mass:g} kg on {own.stiffness:g} N/m"
     if flexure is None:
         return text
-    return f"{text}, which bend in {counted(flexure.n_modes, 'mode')}"
+    bends = "bends" if strips.number == 1 else "bend"
+    return f"{text}, which {bends} in {counted(flexure.n_modes, 'mode')}"
 
 
 def _description(placement: Placement, problem: Problem) -> str:
