@@ -43,34 +43,6 @@ class ControlArrays(NamedTuple):
         return self.numbers[_N_MEMORY:]
 
 
-def control_arrays(
-    settings: dict[str, float],
-    gains: tuple[tuple[float, float, float, float], ...],
-    n_delayed: int,
-    from_time: float,
-) -> ControlArrays:
-    """A controller before its first step.
-
-    Parameters
-    ----------
-    settings : dict of str to float
-        Values by the names of ``native.REGULATION``.
-    gains : tuple of rows
-        Rows of ``native.CONTROL_GAINS``.
-    n_delayed : int
-        Delay in samples.
-    from_time : float
-        Time of the first sample [s].
-    """
-    made = np.zeros(1, dtype=native.REGULATION)
-    for name, value in settings.items():
-        made[name] = value
-    numbers = np.zeros(_N_MEMORY + n_delayed)
-    control = ControlArrays(made, np.array(list(gains), dtype=native.CONTROL_GAINS), numbers)
-    control.memory["next"], control.memory["samples"] = from_time, -1.0
-    return control
-
-
 @dataclass(frozen=True)
 class Regulation:
     """A PID controller of sampled values, with scheduled gains.
@@ -104,18 +76,18 @@ class Regulation:
         return round(self.delay / self.sample_time)
 
     def arrays(self, dt: float) -> ControlArrays:
-        """Arrays of the controller for kernels, for steps of ``dt`` [s] from time 0 on."""
-        slow = self.filter_time > 0.0
-        settings = {
-            "of_height": float(self.of_height),
-            "target": self.target,
-            "part": -math.expm1(-dt / self.filter_time) if slow else 1.0,
-            "dt": dt,
-            "sample": self.sample_time,
-            "least": self.least,
-            "most": self.most,
-        }
-        return control_arrays(settings, self.gains, self.n_delayed, self.from_time)
+        """The controller before its first step, for steps of ``dt`` [s] from time 0 on."""
+        settings = np.zeros(1, dtype=native.REGULATION)
+        settings["of_height"], settings["target"] = self.of_height, self.target
+        settings["part"], settings["dt"] = 1.0, dt
+        if self.filter_time > 0.0:
+            settings["part"] = -math.expm1(-dt / self.filter_time)
+        settings["sample"] = self.sample_time
+        settings["least"], settings["most"] = self.least, self.most
+        gains = np.array(list(self.gains), dtype=native.CONTROL_GAINS)
+        control = ControlArrays(settings, gains, np.zeros(_N_MEMORY + self.n_delayed))
+        control.memory["next"], control.memory["samples"] = self.from_time, -1.0
+        return control
 
 
 class Controller(Protocol):

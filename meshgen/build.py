@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.meshgen.chains import assemble, names_of
-from catenary.meshgen.geometry import check_counts, divide, divisions_of, find_cuts
+from catenary.meshgen.geometry import divide, divisions_of, find_cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 
@@ -56,7 +56,6 @@ def make_mesh(
             line, elements_per_gap, path, support_refinement=support_refinement, grading=grading
         )
         return read_mesh(path, names_of(line))
-    check_counts(elements_per_gap, support_refinement)
     cuts = find_cuts(line)
     divisions = divisions_of(cuts, elements_per_gap, support_refinement)
     return assemble(divide(line, cuts, divisions, grading), names_of(line), "the line")

@@ -107,16 +107,6 @@ def _check_heights(line: Line, group: Droppers) -> None:
         )
 
 
-def check_counts(elements_per_gap: int, support_refinement: int) -> None:
-    """Raise InputError unless both counts are whole numbers of at least 1."""
-    for key, count in (
-        ("elements_per_gap", elements_per_gap),
-        ("support_refinement", support_refinement),
-    ):
-        if count < 1:
-            raise InputError(f"{key} is {count}, but must be a whole number of at least 1")
-
-
 def divisions_of(cuts: Cuts, elements_per_gap: int, support_refinement: int) -> np.ndarray:
     """Elements (n - 1,) between neighbouring ones of n cuts.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.python_signals import python_signals_kept
-from catenary.meshgen.geometry import Cuts, check_counts, divisions_of, find_cuts
+from catenary.meshgen.geometry import Cuts, divisions_of, find_cuts
 from catenary.meshgen.hardware import Droppers
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import ANCHORS
@@ -47,10 +47,9 @@ def write_mesh(
     Raises
     ------
     InputError
-        If a count is below 1, the file cannot be written, or the line is impossible
+        If the file cannot be written, or the line is impossible
         (see ``catenary.meshgen.geometry.find_cuts``).
     """
-    check_counts(elements_per_gap, support_refinement)
     if path.suffix != ".msh":
         raise InputError(f"the mesh file {path} must have a name that ends in .msh")
     cuts = find_cuts(line)

@@ -43,17 +43,10 @@ class DropperKind:
                 steepness(self.curve) / length[:, None],
             )
         none = np.zeros((length.size, 1))
-        return Slopes(none, none, self.stiffness_at(length)[:, None])
-
-    def stiffness_at(self, length: np.ndarray) -> np.ndarray:
-        """Stiffness of droppers of these lengths (n,) [m] without tension, shape as ``length``
-        [N/m]."""
         if self.stiffness is not None:
-            return np.full(length.shape, self.stiffness)
-        if self.curve is not None:
-            return np.asarray(steepness(self.curve)[0] / length)
+            return Slopes(none, none, np.full(none.shape, self.stiffness))
         assert self.axial_stiffness is not None
-        return np.asarray(self.axial_stiffness / length)
+        return Slopes(none, none, self.axial_stiffness / length[:, None])
 
     def stiffest_at(self, length: float) -> float:
         """The largest stiffness of a dropper of a length [m] [N/m]."""

@@ -5,7 +5,7 @@ SI units. Axes: x along the track from the first anchor, y lateral, z up from th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
 
@@ -197,23 +197,10 @@ class Wire(Conductor):
         role: Role,
         pieces: tuple[Piece, ...],
         profile: Profile | None = None,
-        taken: tuple[tuple[float, float, float], ...] = (),
     ) -> Wire:
         """A wire made of a conductor; see ``Wire`` for the other parameters."""
-        return cls(
-            conductor.tension,
-            conductor.mass_per_length,
-            conductor.bending_stiffness,
-            name,
-            role,
-            pieces,
-            profile,
-            taken,
-            axial_stiffness=conductor.axial_stiffness,
-            expansion=conductor.expansion,
-            diameter=conductor.diameter,
-            drag_coefficient=conductor.drag_coefficient,
-        )
+        own = {part.name: getattr(conductor, part.name) for part in fields(Conductor)}
+        return cls(**own, name=name, role=role, pieces=pieces, profile=profile)
 
     def tension_at(self, x: np.ndarray | float) -> np.ndarray:
         """Tension at positions ``x`` [m], shape as ``x`` [N]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -94,7 +95,8 @@ class PantographStudy(NamedTuple):
 def study(scene: Scene, kind: str | None, n_masses: int | None, over: Range) -> PantographStudy:
     """The response of a kind of pantograph of a scene, the leading one's if none is named.
 
-    ``n_masses`` of the lumped model: as many as a lumped pantograph has, or two, if left out.
+    ``n_masses`` of the lumped model: as many as a lumped pantograph has, or two, and one more for
+    strips on springs of their own, if left out.
 
     Raises
     ------
@@ -113,11 +115,14 @@ def study(scene: Scene, kind: str | None, n_masses: int | None, over: Range) -> 
         if force is None:
             raise InputError(f"it has no static force at {speed:g} km/h")
         data = pantograph_of(kind, table, speed)
+        if not scene.switches()["flexible_strips"]:
+            data = replace(data, strips=replace(data.strips, flexure=None))
         response = head_response(data, force)
     except InputError as error:
         raise InputError(f"pantographs.{kind}: {error}") from error
     if n_masses is None:
-        n_masses = 2 if isinstance(data, MultibodyData) else min(data.n_masses, 3)
+        own = 2 if isinstance(data, MultibodyData) else data.n_masses
+        n_masses = min(own + (data.strips.suspension is not None), 3)
     at = np.geomspace(over.fit_low, over.high, N_FITTED)
     fit = fit_chain(at, response.model.receptance(at), n_masses)
     receptance = response.model.receptance(over.frequencies())

@@ -19,6 +19,10 @@ from catenary.solver.kernels import native
 class Law:
     """A force over an extension, straight between its points and beyond its ends.
 
+    Extensions between two masses count from where all springs are relaxed. Those between a mass and
+    the base count from where the mass stands with the head at its nominal height under the static
+    force, where the base spring of a chain is relaxed.
+
     Attributes
     ----------
     mass : which mass it holds, the head being 0
@@ -26,8 +30,6 @@ class Law:
     of_rate : whether its points are rates
     points : extensions [m] or their rates [m/s], which grow
     forces : [N] at these, which never fall
-    from_rest : whether extensions count from where the mass stands with the head at its nominal
-        height under the static force; else from where all springs are relaxed
     """
 
     mass: int
@@ -35,7 +37,6 @@ class Law:
     of_rate: bool
     points: tuple[float, ...]
     forces: tuple[float, ...]
-    from_rest: bool = False
 
     def force(self, x: float) -> float:
         """Force at ``x``, an extension [m] or a rate [m/s], that pulls together where it is
@@ -133,13 +134,10 @@ def in_place(
         Heights of the masses at rest under the static force, at the nominal height [m].
     """
     ways, by_base, zero = np.zeros((len(laws), n)), np.zeros(len(laws)), np.zeros(len(laws))
-    heights = [*rest, 0.0]
     for j, law in enumerate(laws):
         ways[j, numbers[law.mass]] = 1.0
         if law.below < len(numbers):
             ways[j, numbers[law.below]] = -1.0
         else:
-            by_base[j] = -1.0
-        if law.from_rest:
-            zero[j] = heights[law.mass] - heights[law.below]
+            by_base[j], zero[j] = -1.0, rest[law.mass]
     return LawsInPlace(tuple(laws), ways, by_base, zero)

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.head_arrays import SplineTables
@@ -54,26 +54,10 @@ class ReducedMechanism:
     carried: np.ndarray | None = None
     blown: np.ndarray | None = None
 
-    @cached_property
-    def _table(self) -> CubicSpline:
-        columns = np.stack([self.masses, self.lifts, self.dampings], axis=1)
-        return CubicSpline(self.heights, columns)
-
-    @cached_property
-    def _slopes(self) -> PPoly:
-        return self._table.derivative()
-
     def at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
-        """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre.
-
-        Raises
-        ------
-        RunBroken
-            The height is not within the tables.
-        """
-        if not self.heights[0] <= height <= self.heights[-1]:
-            raise self.left(height)
-        return self._table(height), self._slopes(height)
+        """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre."""
+        values, slopes = self._tables_at_rest.at(height)
+        return values[:3], slopes[:3]
 
     def tables(self, carried: bool) -> SplineTables:
         """Splines of mass, lift, damping, carried mass (zero without ``carried``) and, of a

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks
 
-from catenary.base.errors import InputError, RunBroken
+from catenary.base.errors import RunBroken
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, stand
 from catenary.mbs.response.linearisation import LinearModel, linearise, of_chain, with_strips
@@ -58,11 +58,9 @@ def head_response(data: LumpedData | MultibodyData, static_force: float) -> Head
     """
     if isinstance(data, MultibodyData):
         return _of_mechanism(data)
-    if isinstance(data, LumpedData):
-        masses = {f"mass {k + 1}": mass for k, mass in enumerate(data.masses)}
-        model = with_strips(of_chain(data), data.strips)
-        return HeadResponse(model, static_force, masses, data.stiffnesses[-1])
-    raise InputError(f"There is no frequency response of a {type(data).__name__}.")
+    masses = {f"mass {k + 1}": mass for k, mass in enumerate(data.masses)}
+    model = with_strips(of_chain(data), data.strips)
+    return HeadResponse(model, static_force, masses, data.stiffnesses[-1])
 
 
 def _of_mechanism(data: MultibodyData) -> HeadResponse:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.head.strips import Strips
+from catenary.mbs.head.strips import Strips, Suspension, head_parts
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import Motion, Vector
@@ -136,28 +136,36 @@ def of_chain(data: LumpedData) -> LinearModel:
 def with_strips(model: LinearModel, strips: Strips) -> LinearModel:
     """Return a model with its strips on their own springs, loaded on all of them alike.
 
-    The strips' masses are part of what the model's loaded point carries; they move as one.
+    The strips' masses are part of what the model's loaded point carries; they move, and bend, as
+    one, and are loaded in their middle.
     """
-    sprung = strips.suspension
+    sprung, flexure, n = strips.suspension, strips.flexure, strips.number
     if sprung is None:
         return model
-    way = np.append(-model.push, 1.0)  # stretch of the strips' springs
-    stretch = strips.number * np.outer(way, way)
+    own_mass = n * sprung.mass
+    if flexure is not None:
+        flexure = replace(flexure, stiffness=n * flexure.stiffness)
+    own = Suspension(own_mass, n * sprung.stiffness, n * sprung.damping)
+    as_one = Strips(1, length=strips.length, suspension=own, flexure=flexure)
+    # Coordinates are the strip's height, the head's, and the strip's modes.
+    parts, head = head_parts(2.0 * own_mass, 0.0, 0.0, as_one), 1
+    masses = parts.masses.copy()
+    masses[head] = -own_mass
+    k, more = model.push.size, parts.n - 1
+    ways = np.zeros((parts.n, k + more))
+    ways[head, :k] = model.push
+    ways[np.delete(np.arange(parts.n), head), k + np.arange(more)] = 1.0
 
-    def grown(matrix: np.ndarray) -> np.ndarray:
-        return np.pad(matrix, (0, 1))
+    def grown(matrix: np.ndarray, of_strips: np.ndarray) -> np.ndarray:
+        return np.asarray(np.pad(matrix, (0, more)) + ways.T @ of_strips @ ways)
 
-    mass = grown(model.mass)
-    together = strips.number * sprung.mass
-    mass[:-1, :-1] -= together * np.outer(model.push, model.push)
-    mass[-1, -1] = together
     return replace(
         model,
-        mass=mass,
-        damping=grown(model.damping) + sprung.damping * stretch,
-        stiffness=grown(model.stiffness) + sprung.stiffness * stretch,
-        push=np.append(np.zeros_like(model.push), 1.0),
-        ways=np.pad(model.ways, ((0, 0), (0, 1))),
+        mass=grown(model.mass, np.diag(masses)),
+        damping=grown(model.damping, parts.damping[:-1, :-1]),
+        stiffness=grown(model.stiffness, parts.stiffness[:-1, :-1]),
+        push=parts.touch[0] @ ways,
+        ways=np.pad(model.ways, ((0, 0), (0, more))),
     )
 
 

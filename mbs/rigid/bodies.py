@@ -27,21 +27,6 @@ def rotation_matrix(parameters: np.ndarray) -> np.ndarray:
     return matrices
 
 
-def quaternion_product(p: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """Euler parameters (..., 4) of the rotation r, in axes already rotated by p."""
-    p0, p1, p2, p3 = np.moveaxis(p, -1, 0)
-    r0, r1, r2, r3 = np.moveaxis(r, -1, 0)
-    return np.stack(
-        [
-            p0 * r0 - p1 * r1 - p2 * r2 - p3 * r3,
-            p0 * r1 + p1 * r0 + p2 * r3 - p3 * r2,
-            p0 * r2 + p2 * r0 + p3 * r1 - p1 * r3,
-            p0 * r3 + p3 * r0 + p1 * r2 - p2 * r1,
-        ],
-        axis=-1,
-    )
-
-
 def normalised(parameters: np.ndarray) -> np.ndarray:
     """Euler parameters (..., 4) scaled to p^T p = 1."""
     return parameters / np.linalg.norm(parameters, axis=-1, keepdims=True)

@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 
 from catenary.mbs.rigid.arrays import Joint
-from catenary.mbs.rigid.bodies import SPACE, Body, Vector, quaternion_product
+from catenary.mbs.rigid.bodies import SPACE, Body, Vector
 from catenary.mbs.rigid.forces import Force, PointForce
 from catenary.mbs.rigid.joints import Fixed, PointOnCurve, PrescribedPoint
 from catenary.mbs.rigid.system import System
-
-_HALF_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def turned_round(system: System) -> System:
@@ -39,15 +37,14 @@ def _across(vector: Vector) -> tuple[float, float, float]:
 
 def _parameters(parameters: np.ndarray) -> tuple[float, ...]:
     """Euler parameters (4,) of an orientation in space after half a turn, e0 >= 0."""
-    after = quaternion_product(_HALF_TURN, parameters)
-    return tuple(float(value) for value in (-after if after[0] < 0.0 else after))
+    e0, e1, e2, e3 = (float(value) for value in parameters)
+    after = (-e3, -e2, e1, e0)
+    return tuple(-value for value in after) if after[0] < 0.0 else after
 
 
 def _body(body: Body) -> Body:
-    turn = np.asarray(body.turn, dtype=float)
-    e0 = np.sqrt(max(0.0, 1.0 - turn @ turn))
-    after = _parameters(np.concatenate([[e0], turn]))
-    return replace(body, position=_across(body.position), turn=after[1:])
+    turn = _parameters(body.parameters)[1:]
+    return replace(body, position=_across(body.position), turn=turn)
 
 
 def _joint(joint: Joint) -> Joint:

@@ -13,7 +13,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.solver.ends.half_lines import SpanMatrices, span_matrices
-from catenary.solver.model.entries import iterate_entries
+from catenary.solver.model.entries import iterate_sums
 from catenary.solver.model.model import Model
 
 # Difference of two spans of a kind, over the largest entry: dropper lengths differ by millimetres
@@ -75,7 +75,7 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
         )
     first, low, high = sorted(marks)
     numbering = model.numbering
-    begins = [int(numbering.within(x - _TINY, np.inf)[0]) for x in (first, low, high)]
+    begins = [numbering.first_at(x) for x in (first, low, high)]
     size = begins[1] - begins[0]
     last = numbering.size if side == END else begins[2] + size
     at_end = begins[2] if side == END else begins[0]
@@ -126,7 +126,7 @@ def span_between(model: Model, mast: float, following: float) -> tuple[np.ndarra
     InputError
         If spans are joined by more than a cross-section at a mast.
     """
-    first, last = (int(model.numbering.within(x - _TINY, np.inf)[0]) for x in (mast, following))
+    first, last = model.numbering.first_at(mast), model.numbering.first_at(following)
     end = min(model.numbering.size, 2 * last - first)
     whole = np.zeros((3, last - first, 2 * (last - first)))
     whole[:, :, : end - first] = _matrices(model, first, last, first, end)
@@ -204,8 +204,9 @@ def _matrices(model: Model, first: int, last: int, low: int, high: int) -> np.nd
     """M, C and K of rows [first, last) and columns [low, high), (3, n, m), held ones included."""
     result = np.zeros((3, last - first, high - low))
     kinds = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
-    for matrix, (mass, stiffness, damping) in zip(result, kinds, strict=True):
-        for rows, columns, values in iterate_entries(model, first, last, mass, stiffness, damping):
-            near = (columns >= low) & (columns < high)
-            np.add.at(matrix, (rows[near] - first, columns[near] - low), values[near])
+    for rows, columns, values in iterate_sums(model, first, last, kinds):
+        near = (columns >= low) & (columns < high)
+        at = rows[near] - first, columns[near] - low
+        for matrix, own in zip(result, values[:, near], strict=True):
+            np.add.at(matrix, at, own)
     return result

@@ -109,7 +109,7 @@ def _watch_tension(
     tension = watched[TENSION]
     tension.weights[i] = axial_elements.strain_rows(model, wire.name)[element]
     tension.law["stiffness"][i] = wire.axial_stiffness * left[0]
-    tension.law["rest"][i] = _tension_at_rest(model, place, element)
+    tension.law["rest"][i] = model.tension_of(wire.name)[element]
 
 
 def _watch_stops(
@@ -162,15 +162,6 @@ def _element_at(model: Model, wire: str, place: GaugePlace) -> tuple[int, int]:
     element = int(np.argmin(np.abs(model.mesh.x(pairs[:, side]) - place.x)))
     assert abs(model.mesh.x(pairs[element, side]) - place.x) < SAME_STATION
     return element, int(pairs[element, side])
-
-
-def _tension_at_rest(model: Model, place: GaugePlace, element: int) -> float:
-    wire, mesh, form = model.problem.line.wires[place.wire], model.mesh, model.form
-    x = float(mesh.x(mesh.elements(wire.name)[element]).mean())
-    gained = 0.0
-    if form is not None and wire.name in form.gained_tension:
-        gained = float(form.gained_tension[wire.name][element])
-    return float(wire.tension_at(x)) + gained
 
 
 def _moved(model: Model, node: int) -> float:

@@ -143,6 +143,10 @@ class Unknowns:
         first, last = self.stations_within(np.array(x_low), np.array(x_high))
         return int(self.starts[first]), int(self.starts[last])
 
+    def first_at(self, x: float) -> int:
+        """Number of the first unknown of the station at a place along the track [m]."""
+        return self.within(x - 1e-6, np.inf)[0]
+
     def stations_within(
         self, x_low: np.ndarray, x_high: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:

@@ -81,10 +81,5 @@ def mid_points(model: Model) -> np.ndarray:
 
 def tension_at_rest(model: Model, end: WireEnd) -> float:
     """Tension of a wire in its last element before an end, at rest [N]."""
-    mesh, wire = model.mesh, model.problem.line.wire(end.wire)
-    pairs = mesh.elements(end.wire)
-    element = int(np.flatnonzero((pairs == end.node).any(axis=1))[0])
-    tension = float(wire.tension_at(mesh.x(pairs[element]).mean()))
-    if model.form is not None and end.wire in model.form.gained_tension:
-        tension += float(model.form.gained_tension[end.wire][element])
-    return tension
+    element = np.flatnonzero((model.mesh.elements(end.wire) == end.node).any(axis=1))[0]
+    return float(model.tension_of(end.wire)[element])

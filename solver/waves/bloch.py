@@ -138,7 +138,7 @@ def period_of(model: Model, start: float, end: float) -> Period:
     """
     unknowns = model.numbering
     length = end - start
-    starts = [_first_number(model, x) for x in (start - length, start, end, end + length)]
+    starts = [unknowns.first_at(x) for x in (start - length, start, end, end + length)]
     if len(set(np.diff(starts).tolist())) > 1:
         raise InputError(
             f"the spans beside that from {start:g} to {end:g} m have other nodes: the waves of a "
@@ -166,11 +166,6 @@ def period_of(model: Model, start: float, end: float) -> Period:
         length, stiffness, mass, stiffness_next, mass_next,
         (numbers[inside] - starts[1]).astype(np.int64), x[inside] - start,
     )  # fmt: skip
-
-
-def _first_number(model: Model, x: float) -> int:
-    """Number of the first unknown of the station at a place along the track [m]."""
-    return int(model.numbering.within(x - 1e-6, np.inf)[0])
 
 
 def bloch_waves(period: Period, highest: float) -> BlochWaves:

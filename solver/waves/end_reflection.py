@@ -143,7 +143,7 @@ def _unknowns_at(model: Model, side: int, masts: np.ndarray) -> list[np.ndarray]
         span_between(model, low, high)[0] for low, high in zip(inner[:-1], inner[1:], strict=True)
     ]
     # The last mast along the track begins no span: its unknowns stand as at the one before.
-    starts = [int(model.numbering.within(x - 1e-6, np.inf)[0]) for x in inner[-2:]]
+    starts = [model.numbering.first_at(x) for x in inner[-2:]]
     found.append(found[-1] - starts[0] + starts[1])
     return found[::-1] if side == END else found
 

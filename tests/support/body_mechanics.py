@@ -12,7 +12,7 @@ from catenary import InputError
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
-from catenary.mbs.rigid.bodies import Body, Motion, Vector, normalised, quaternion_product
+from catenary.mbs.rigid.bodies import Body, Motion, Vector, normalised
 from catenary.mbs.rigid.forces import BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import unit
 from catenary.mbs.rigid.kinematics import Law, point
@@ -112,6 +112,21 @@ def acceleration(
     (mass, lift, damping), (mass_slope, _, _) = mechanism.at(height)
     force = lift - damping * speed - 0.5 * mass_slope * speed**2 + push
     return float(force / mass)
+
+
+def quaternion_product(p: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Euler parameters (..., 4) of the rotation r, in axes already rotated by p."""
+    p0, p1, p2, p3 = np.moveaxis(p, -1, 0)
+    r0, r1, r2, r3 = np.moveaxis(r, -1, 0)
+    return np.stack(
+        [
+            p0 * r0 - p1 * r1 - p2 * r2 - p3 * r3,
+            p0 * r1 + p1 * r0 + p2 * r3 - p3 * r2,
+            p0 * r2 + p2 * r0 + p3 * r1 - p1 * r3,
+            p0 * r3 + p3 * r0 + p1 * r2 - p2 * r1,
+        ],
+        axis=-1,
+    )
 
 
 def parameter_rates(parameters: np.ndarray, spin: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 from body_mechanics import place_rates
 from scipy import linalg
 
-from catenary import InputError, RunBroken
+from catenary import RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.system import System, independent_rows
@@ -58,13 +58,6 @@ class Baumgarte:
     frequency: float = 10.0
     damping: float = 10.0
 
-    def __post_init__(self) -> None:
-        if self.frequency < 0.0 or self.damping < 0.0:
-            raise InputError(
-                f"Baumgarte's frequency {self.frequency} and damping {self.damping} "
-                "must not be negative."
-            )
-
     def begin(self, system: System, motion: Motion, time: float) -> None:
         """Needs no preparation."""
 
@@ -99,10 +92,6 @@ class AugmentedLagrangian:
     damping_ratio: float = 1.0
     tolerance: float = 1e-11
     max_iterations: int = 30
-
-    def __post_init__(self) -> None:
-        if self.penalty <= 0.0:
-            raise InputError(f"The augmented Lagrangian's penalty {self.penalty} must be positive.")
 
     def begin(self, system: System, motion: Motion, time: float) -> None:
         """Needs no preparation."""
@@ -147,11 +136,6 @@ class CoordinatePartitioning:
     max_iterations: int = 20
     _dependent: np.ndarray = field(init=False, repr=False, default_factory=lambda: np.zeros(0, int))
     _kept: np.ndarray = field(init=False, repr=False, default_factory=lambda: np.zeros(0, int))
-
-    @property
-    def dependent(self) -> np.ndarray:
-        """Numbers of the dependent coordinates among the 6 n."""
-        return self._dependent
 
     def begin(self, system: System, motion: Motion, time: float) -> None:
         """Choose dependent coordinates: as many as independent rows, best conditioned."""

@@ -66,7 +66,7 @@ def full_line() -> LineData:
 def full_problem(names: frozenset[str]) -> Problem:
     line = full_line()
     uplift = Uplift(Polynomial((0.0, 0.0, 0.01)))
-    limiter = Law(1, 2, False, (-1.0, 0.1, 1.0), (0.0, 0.0, 9e3), from_rest=True)
+    limiter = Law(1, 2, False, (-1.0, 0.1, 1.0), (0.0, 0.0, 9e3))
     rolling = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0), uplift=uplift, laws=(limiter,))
     bending = Strips(
         length=1.6, suspension=Suspension(1.0, 8e3, 10.0), flexure=Flexure(600.0, 0.9, 2), rake=0.3

@@ -10,7 +10,7 @@ from body_mechanics import from_vector
 from constraint_handling import ConstraintHandling, project
 from scipy.integrate import solve_ivp
 
-from catenary import InputError, RunBroken
+from catenary import RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.system import System
 
@@ -55,13 +55,11 @@ def integrate(
     Raises
     ------
     InputError
-        The start does not satisfy the joints and cannot be assembled, or times do not grow.
+        The start does not satisfy the joints and cannot be assembled.
     RunBroken
         The integration cannot go on.
     """
     at = np.asarray(times, dtype=float)
-    if len(at) < 1 or np.any(np.diff(at) <= 0.0):
-        raise InputError(f"Times of an integration must grow: {at}.")
     motion = project(system, start, at[0]) if correct else start
     motions, errors, n_evaluations = [motion], [(0.0, 0.0, 0.0)], 0
     # A run without correction starts from the given state.

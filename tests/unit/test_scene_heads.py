@@ -25,6 +25,12 @@ LONG = f"{KIND}.strips.length_m=1.6"
 ROLL = [f"{KIND}.roll={{inertia_kg_m2=2.0, spring_distance_m=0.6}}", "effects.head_roll=true"]
 MOVES = "effects.vehicle_motion=true"
 FRA = "vehicle.irregularity.spectrum=fra_6"
+CAR = (
+    "vehicle.suspension={body_mass_kg=32e3,pitch_inertia_kg_m2=1.97e6,stiffness_N_per_m=860e3,"
+    "damping_N_s_per_m=40e3,bogie_distance_m=19.0,wheelbase_m=2.56,lateral={"
+    "roll_inertia_kg_m2=56.8e3,stiffness_N_per_m=320e3,damping_N_s_per_m=64e3,"
+    "spring_distance_m=2.0,centre_above_m=0.8,roof_above_m=1.8}}"
+)
 
 
 def load(*overrides: str) -> Scene:
@@ -81,6 +87,17 @@ def test_a_vehicle_is_the_sum_of_what_its_tables_give() -> None:
         ),
         (Table((0, 500, 1000, 2000), (0, 0.05, 0, 0.01), along_track=True), track),
     )
+
+
+def test_a_vehicle_sways_below_strips_that_bend() -> None:
+    bends = f"{KIND}.strips.flexure={{bending_stiffness_N_m2=500, spring_distance_m=0.8}}"
+    own = [f"{KIND}.strips.mass_kg=1.2", f"{KIND}.strips.stiffness_N_per_m=9000"]
+    sine = ["vehicle.lateral.amplitude_m=0.05", "vehicle.lateral.frequency_hz=1.7"]
+    problem = problem_of(load(bends, *own, LONG, *sine, CAR, FRA, MOVES))
+    vehicle = problem.train.vehicle
+    assert vehicle is not None and vehicle.suspension is not None
+    assert Harmonic(0.05, 1.7, 0.0) in vehicle.lateral
+    assert vehicle.suspension.sideways is not None
 
 
 def test_files_are_taken_in_and_the_resolved_scene_needs_them_no_more(tmp_path: Path) -> None:
@@ -167,6 +184,8 @@ def test_a_run_ends_before_the_foremost_strip_leaves_the_line() -> None:
             ["vehicle.lateral.amplitude_m=0.1", "vehicle.lateral.frequency_hz=1", MOVES],
             "acts only with effects.head_roll = true",
         ),
+        ([CAR, FRA, MOVES], "acts only with effects.head_roll = true"),
+        ([CAR.replace("19.0", "2.0"), FRA, MOVES, *ROLL, LONG], "must have bogies apart"),
         (
             [*ROLL, f"{KIND}.strips.length_m=0.45", "vehicle.irregularity.spectrum=fra_4", MOVES],
             "beside the strips' middle (line.stagger_m and vehicle)",

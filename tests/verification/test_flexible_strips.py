@@ -23,7 +23,8 @@ from catenary.mbs.head.strips import (
 )
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped_data import LumpedData, chain_matrix
+from catenary.mbs.response.frequency_response import head_response
 
 # A carbon strip on its aluminium holder: 1.1 m, 3 kg, EI of some hundreds.
 LENGTH, MASS, EI, SPRING, APART = 1.1, 3.0, 600.0, 8000.0, 0.7
@@ -60,6 +61,28 @@ def test_tables_hold_the_shapes_between_their_points() -> None:
     c = tables.coefficients[i]
     found = ((c[..., 0].T * d + c[..., 1].T) * d + c[..., 2].T) * d + c[..., 3].T
     check("shapes", found, shapes(4, LENGTH, y), within=2e-7)
+
+
+def test_the_response_of_a_pantograph_has_its_strips_that_bend() -> None:
+    """Two strips alike: as one of twice the mass, springs and EI, under the matrices of a run."""
+    at = np.geomspace(0.5, 60.0, 40)
+    chain = (9.0, 15.0), (4200.0, 50.0), (10.0, 90.0)
+    found = head_response(LumpedData(*chain, strips(3, number=2)), 120.0).model.receptance(at)
+    twice = Suspension(2.0 * MASS, 2.0 * SPRING, 20.0)
+    one = Strips(1, 0.0, LENGTH, twice, flexure=Flexure(2.0 * EI, APART, 3))
+    head = LumpedData(*chain, one).head(rolls=False)
+    mass = np.diag([*head.masses, 15.0])
+    springs, dampers = (
+        chain_matrix(matrix, values)[:-1, :-1]
+        for matrix, values in ((head.stiffness, (50.0,)), (head.damping, (90.0,)))
+    )
+    push, omega = np.append(head.touch[0], 0.0), 2.0 * np.pi * at[:, None, None]
+    dynamic = springs - omega**2 * mass + 1j * omega * dampers
+    expected = np.linalg.solve(dynamic, np.tile(push[:, None], (at.size, 1, 1)))[..., 0] @ push
+    check("H / H", np.abs(found / expected - 1.0), 0.0, within=1e-9)
+    rigid = replace(strips(3, number=2), flexure=None)
+    stiff = head_response(LumpedData(*chain, rigid), 120.0).model.receptance(at)
+    assert np.abs(found / stiff - 1.0).max() > 0.1
 
 
 def elements(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

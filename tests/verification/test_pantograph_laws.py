@@ -23,7 +23,7 @@ MASS = 10.0
 
 def limiter(rise: float, stiffness: float, mass: int = 0, below: int = 1) -> Law:
     points, forces = (-1.0, rise, rise + 1.0), (0.0, 0.0, stiffness)
-    return Law(mass, below, False, points, forces, from_rest=True)
+    return Law(mass, below, False, points, forces)
 
 
 def damper(up: float, down: float, mass: int = 0, below: int = 1) -> Law:
@@ -163,6 +163,19 @@ def test_all_laws_at_once_beside_an_independent_integrator() -> None:
     assert np.ptp(solved.y[1]) > 0.05
     assert solved.y[1].max() > 5.0 + pressed + 0.03  # the limiter acts
     check("largest difference [m]", np.abs(found - solved.y[:2].T).max(), 0.0, within=6e-5)
+
+
+def test_a_spring_to_the_base_written_as_a_law_is_a_part_of_the_base_spring() -> None:
+    """A linear law counts from the relaxed base spring: both are one spring, to round-off."""
+    half = Law(1, 2, False, (-1.0, 1.0), (-50.0, 50.0))
+    found = []
+    for stiffness, laws in ((100.0, ()), (50.0, (half,))):
+        data = LumpedData((7.2, 15.0), (4200.0, stiffness), (10.0, 90.0), laws=laws)
+        one = LumpedPantograph(data, 120.0, 5.0, Stepping(0.0, 1e-3))
+        one.place(4.95)
+        found.append(march(one, 1e-3, 500, lambda time: 120.0 + 50.0 * math.sin(20.0 * time)))
+    assert np.ptp(found[0][:, 1]) > 0.02
+    check("largest difference [m]", np.abs(found[0] - found[1]).max(), 0.0, within=1e-9)
 
 
 def test_a_law_on_a_mechanism_s_arm_is_what_its_tables_would_hold() -> None:

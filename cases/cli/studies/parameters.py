@@ -48,7 +48,7 @@ def pantograph(
         typer.Option(
             "--fit",
             metavar="N",
-            help="Masses of the lumped model, 1 to 3; two if absent, a lumped pantograph's own.",
+            help="Masses of the lumped model, 1 to 3; if absent two, or a lumped pantograph's own.",
         ),
     ] = None,
     low: Annotated[float, typer.Option("--from", metavar="HZ", help="Lowest frequency.")] = 0.1,

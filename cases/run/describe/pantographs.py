@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from catenary.cases.scene.scene import Scene
@@ -39,17 +40,20 @@ def _strips_of(strips: Strips) -> str:
     text = "; 1 strip" if strips.number == 1 else f"; 2 strips {strips.spacing:g} m apart"
     if strips.suspension is None:
         return text
-    own = strips.suspension
-    return f"{text} of {own.mass:g} kg on {own.stiffness:g} N/m"
+    own, flexure = strips.suspension, strips.flexure
+    text += f" of {own.mass:g} kg on {own.stiffness:g} N/m"
+    if flexure is None:
+        return text
+    bends = "bends" if strips.number == 1 else "bend"
+    return f"{text}, which {bends} in {counted(flexure.n_modes, 'mode')}"
 
 
 def _description(placement: Placement, problem: Problem) -> str:
     """A line about a pantograph under way."""
-    text = description_of(placement.data, placement.static_force)
-    acts = simulated(problem)
-    flexure = placement.data.strips.flexure
-    if acts.flexible_strips and flexure is not None:
-        text += f"; strips bend in {counted(flexure.n_modes, 'mode')}"
+    data, acts = placement.data, simulated(problem)
+    if not acts.flexible_strips:
+        data = replace(data, strips=replace(data.strips, flexure=None))
+    text = description_of(data, placement.static_force)
     if acts.raked_strips and placement.data.strips.rake:
         text += f"; strips raked by {math.degrees(placement.data.strips.rake):.3g} degrees"
     if acts.pantograph_laws and placement.data.laws:

@@ -19,8 +19,8 @@ from catenary.cases.scene.line.line_data import free_wires, overlaps_of, span_le
 from catenary.cases.scene.problem import line_of
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import divisions_of, find_cuts
-from catenary.meshgen.wires import Wire
 from catenary.solver.effects import all_effects as effects
+from catenary.solver.effects.effect import NamedWire
 
 # 20 000 spans of ten gaps with ten elements each; their run takes some 7 GB.
 MOST_NODES = 4_000_000
@@ -89,11 +89,10 @@ def _of_free_line(scene: Scene) -> Size | None:
         listed = free_wires(scene.line, span_lengths(scene.line)) or ()
     except InputError:
         return None
-    wires = [Wire.of(own.conductor, own.name, own.role, ()) for own in listed]
-    return _size(scene, n_droppers, nodes, wires)
+    return _size(scene, n_droppers, nodes, listed)
 
 
-def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[Wire]) -> Size:
+def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[NamedWire]) -> Size:
     """The size of a line with nodes of wires by name, of which ``wires`` have unknowns."""
     switches = scene.switches()
     chosen = (effect for name, effect in effects.registry().items() if switches[name])

@@ -60,13 +60,27 @@ def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
         return
     if not on and not is_given:
         yield _idle(scene, "vehicle", "vehicle_motion")
-    acts = any(scene.switches()[name] for name in ("head_roll", "lateral_motion"))
-    if on and scene.vehicle.lateral is not None and not acts:
-        yield scene.fault(
-            "vehicle.lateral",
-            "moves the wire along the strips, which acts only with effects.head_roll = true or "
-            "effects.lateral_motion = true",
-        )
+    if on and not _wire_moves_along_strips(scene):
+        suspension = scene.vehicle.suspension
+        sways = suspension is not None and suspension.lateral is not None
+        for key, is_there in (
+            ("vehicle.lateral", scene.vehicle.lateral is not None),
+            ("vehicle.suspension.lateral", sways and scene.switches()["vehicle_suspension"]),
+        ):
+            if is_there:
+                yield scene.fault(
+                    key,
+                    "moves the wire along the strips, which acts only with effects.head_roll = "
+                    "true, effects.lateral_motion = true or strips that bend",
+                )
+
+
+def _wire_moves_along_strips(scene: Scene) -> bool:
+    """Whether it matters where wires cross the strips."""
+    on = scene.switches()
+    kinds = [scene.pantographs[place.name] for place in scene.train.pantographs]
+    bends = on["flexible_strips"] and any(kind.strips.flexure is not None for kind in kinds)
+    return bends or on["head_roll"] or on["lateral_motion"]
 
 
 def _roll_acts(scene: Scene) -> Iterator[Fault]:

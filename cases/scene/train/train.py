@@ -170,6 +170,11 @@ class SuspensionTable(Table):
     @model_validator(mode="after")
     def _consistent(self) -> SuspensionTable:
         together(self, *_BOGIE)
+        if self.wheelbase_m >= self.bogie_distance_m:
+            raise ValueError(
+                f"must have bogies apart, but bogie_distance_m is {self.bogie_distance_m:g} and "
+                f"wheelbase_m {self.wheelbase_m:g}"
+            )
         side = self.lateral
         if side is not None:
             weight = self.body_mass_kg * GRAVITY * side.centre_above_m
@@ -186,7 +191,7 @@ class VehicleTable(Table):
 
     vertical: MotionTable | None = Field(None, description="motion upward")
     lateral: MotionTable | None = Field(
-        None, description="motion to the left; acts with effects.head_roll"
+        None, description="motion to the left of a head that rolls, or whose strips bend"
     )
     irregularity: IrregularityTable | None = Field(
         None, description="track irregularity, which the base follows where there is no suspension"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from body_mechanics import from_vector, parameter_rates, tabulated
+from body_mechanics import from_vector, tabulated
 from measuring import check
 from scipy.spatial.transform import Rotation
 
@@ -114,14 +114,6 @@ def test_rotation_of_euler_parameters_is_the_one_of_scipy() -> None:
     after = motion.moved(np.tile([0.0, 0.0, 0.0, *angles], 2)).rotation
     turn = Rotation.from_rotvec(angles).as_matrix()
     check("after a turn", after[:-1], expected[:-1] @ turn, within=16 * EPS)
-
-
-def test_rates_of_euler_parameters_keep_their_norm_and_are_those_of_turning() -> None:
-    motion, h = some_motion(), 1e-5
-    rates = parameter_rates(motion.parameters, motion.spin)
-    check("p . dp/dt", np.sum(rates * motion.parameters, axis=1), 0.0, within=4 * EPS)
-    forward, back = (motion.moved(s * motion.velocities).parameters for s in (h, -h))
-    check("dp/dt", rates[:-1], (forward - back)[:-1] / (2 * h), within=h**2 + EPS / h)
 
 
 def test_vector_of_a_motion_gives_it_back_normalised() -> None:

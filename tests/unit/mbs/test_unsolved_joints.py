@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary import RunBroken
 from catenary.base.errors import NotConverged
-from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity
 from catenary.mbs.rigid.implicit_steps import Stepper
@@ -56,10 +54,3 @@ def test_velocities_that_joints_do_not_allow_are_told(monkeypatch: pytest.Monkey
 def test_a_penalty_that_does_not_close_a_step_is_told() -> None:
     with pytest.raises(NotConverged, match="not converge within a step: choose another penalty"):
         swung(Augmented(penalty=0.1, max_iterations=5))
-
-
-def test_a_mechanism_beyond_its_heights_is_told() -> None:
-    ones = np.ones(4)
-    frame = ReducedMechanism(np.linspace(0.5, 2.0, 4), ones, ones, ones, "arm")
-    with pytest.raises(RunBroken, match=r"of pantograph 'arm' is at 2\.1 m .* thrown off the wire"):
-        frame.at(2.1)

@@ -45,7 +45,7 @@ BENDING = replace(PAIR, flexure=Flexure(600.0, 0.9, 3, 0.01), rake=0.3)
 ROLLING = replace(TWO, strips=PAIR, roll=Turning(2.0, 600.0, 4.0))
 # A limiter, a pneumatic damper and a spring that stiffens, on head and frame.
 LAWS = (
-    Law(1, 2, False, (-1.0, 0.0, 1.0), (0.0, 0.0, 2e4), from_rest=True),
+    Law(1, 2, False, (-1.0, 0.0, 1.0), (0.0, 0.0, 2e4)),
     Law(1, 2, True, (-1.0, 0.0, 1.0), (-30.0, 0.0, 200.0)),
     Law(0, 1, False, (-0.05, -0.02, 0.0, 1.0), (-600.0, -60.0, 0.0, 0.0)),
 )
