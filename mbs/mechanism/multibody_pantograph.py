@@ -254,7 +254,10 @@ def _is_at(motion: Motion, other: Motion) -> bool:
 
 @lru_cache(maxsize=64)
 def reduced(data: MultibodyData) -> ReducedMechanism:
-    """The mechanism below the head, as far around its working height as it reaches."""
+    """The mechanism below the head, as far around its working height as it reaches.
+
+    It carries the head along and across the track.
+    """
     standing = stand(data)
     frame = without_head(data, standing.system)
     heights = standing.working_height + np.arange(-REACH, REACH + 0.5 * SPACING, SPACING)
@@ -269,6 +272,7 @@ def reduced(data: MultibodyData) -> ReducedMechanism:
         name=data.name,
         blowing=_on_frame(data, standing.motion),
         places=None if standing.actuator_force is None else _mechanism(_bodies_of(data)).places,
+        riding=(standing.head.mass, _on_arm(data, standing.motion, np.zeros(3))),
     )
 
 
@@ -285,17 +289,22 @@ def arm_lift(data: MultibodyData) -> float:
 def _on_frame(data: MultibodyData, motion: Motion) -> tuple[PointForce, ...]:
     """Forces of ``wind`` on the mechanism without its head, which slides on the arm: the arm holds
     the head against what blows it along and across the track."""
-    head, arm = motion.numbers[data.head], motion.numbers[data.arm]
     forces = []
     for force in data.wind:
         along, across, _ = _vector(force)
         if force.body != data.head:
             forces.append(force)
         elif along or across:
-            place = motion.position[head] + motion.rotation[head] @ np.asarray(force.at)
-            at = motion.rotation[arm].T @ (place - motion.position[arm])
+            at = _on_arm(data, motion, np.asarray(force.at))
             forces.append(PointForce(force.name, data.arm, (along, across, 0.0), tuple(at)))
     return tuple(forces)
+
+
+def _on_arm(data: MultibodyData, motion: Motion, at: np.ndarray) -> np.ndarray:
+    """Place of a point of the head in the arm's axes (3,) [m]."""
+    head, arm = motion.numbers[data.head], motion.numbers[data.arm]
+    place = motion.position[head] + motion.rotation[head] @ at
+    return np.asarray(motion.rotation[arm].T @ (place - motion.position[arm]))
 
 
 def _vector(force: PointForce) -> np.ndarray:

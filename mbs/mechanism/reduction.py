@@ -19,7 +19,7 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.head_arrays import SplineTables
 from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.mbs.rigid.forces import Actuator, Force
+from catenary.mbs.rigid.forces import Actuator, Force, PointForce
 from catenary.mbs.rigid.joints import PrescribedPoint
 from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
@@ -105,6 +105,7 @@ def reduce_mechanism(
     name: str = "",
     blowing: Sequence[Force] = (),
     places: Places | None = None,
+    riding: tuple[float, Vector] = (0.0, ORIGIN),
 ) -> ReducedMechanism:
     """Tables of a mechanism for heights of the point ``at`` of a body.
 
@@ -136,6 +137,9 @@ def reduce_mechanism(
     places : Places, optional
         Places that earlier calls have found for the same ``body`` and ``at`` and a system
         that differs in the force of an actuator alone.
+    riding : tuple, optional
+        A mass [kg] that ``body`` carries along and across the track, but not upward, and its place
+        (3,) in the axes of the body [m].
 
     Raises
     ------
@@ -171,9 +175,13 @@ def reduce_mechanism(
     if tolerance is not None:
         found = _refined(raised, more, found, tolerance)
     masses, dampings, carried = np.array([place.columns for place in found]).T
+    mass, its_place = riding
+    for axis in np.eye(3)[:2] if mass else ():
+        push = PointForce("riding", body, tuple(axis), tuple(its_place))
+        masses += mass * np.array([p.way @ push.generalised(p.motion, 0.0) for p in found]) ** 2
     lifts = np.array([raised.lift(place, more) for place in found])
     if np.isnan(lifts).any():  # the actuator moves more than the raising: nothing can be shared
-        options = heights, at, start, as_far_as_it_goes, tolerance, name, blowing
+        options = heights, at, start, as_far_as_it_goes, tolerance, name, blowing, None, riding
         return reduce_mechanism(system, body, *options)
     blown = None
     if blowing:

@@ -47,6 +47,9 @@ def test_lever_in_closed_form() -> None:
     check("lift [N]", found.lifts, -mass * G / 2, within=1e-9)
     # The damper leans by (L - L cos a) / far, at most 3e-7.
     check("damping [N s/m]", found.dampings, damping, within=damping * 1e-6)
+    riding = reduce_mechanism(system, "rod", heights, end, riding=(8.0, end))
+    beside = 8.0 * (1 / cosine_squared - 1)  # it moves along the track by tan a of the height
+    check("mass with one that rides [kg]", riding.masses, found.masses + beside, within=1e-9)
     speed, push, at = 0.7, 25.0, 0.5
     slope = 2 * at / length**2 * mass / 3 / (1 - (at / length) ** 2) ** 2
     force = push - mass * G / 2 - damping * speed - slope * speed**2 / 2
