@@ -36,7 +36,7 @@ from catenary.postproc.report.summary import short_summary
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import N_LANES, SharedLine, why_alone
 from catenary.solver.model.model import Model
-from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, sound_line
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
@@ -100,6 +100,8 @@ _OF_THE_REST = "dropper_lengths"
 # where that may have something to say: of an uplift at an arm [m], a contact force [N], a share of
 # the time without contact.
 _UPLIFT, _FORCE, _LOST = 0.25, 1000.0, 0.1
+# Steps take on what waves have reached: forces are those of the whole line to round-off.
+_REACHED = WindowChoice(EXACT, optional=True)
 # Length of a shared line's columns beyond runs [m]: trains that come later may be longer.
 _BEYOND = 60.0
 
@@ -360,8 +362,10 @@ def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.
 
 
 def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineAtRest) -> Marched:
-    """March a scene by itself."""
+    """March a scene by itself, only the part of its line that waves have reached."""
     keeper, dt = Keeper(), problem.numerics.dt
+    if not rest.problem.window.moves:
+        rest = rest._replace(problem=replace(rest.problem, window=_REACHED))
     try:
         with March(alone(), *rest) as march:
             watch = RunWatch(alone(), watch_inputs(rest, True), watch_cadence(dt))
