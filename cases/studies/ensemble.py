@@ -35,6 +35,7 @@ from catenary.postproc.record.run_watch import RunWatch, watch_cadence, watch_in
 from catenary.postproc.report.summary import short_summary
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import N_LANES, SharedLine, why_alone
+from catenary.solver.kernels import native
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, sound_line
@@ -55,7 +56,11 @@ class Keeper(Observer):
         self._times: list[np.ndarray] = []
         self._rows: list[np.ndarray] = []
         self._columns: dict[str, np.ndarray] = {}
-        self._extremes: dict[str, np.ndarray] = {}
+        self._moving, sizes = stage.moving, (stage.arm_x.size, stage.dropper_x.size)
+        self._extremes = {
+            name: np.repeat([[np.inf], [-np.inf]], size, axis=1)
+            for name, size in zip(_OF_LINE, sizes, strict=True)
+        }
 
     def next_state(self, step: int) -> int:
         """Rows will do."""
@@ -70,12 +75,9 @@ class Keeper(Observer):
             self._read = np.concatenate([*self._columns.values()])
         self._times.append(view.times.copy())
         self._rows.append(view.rows[:, self._read])
-        for name in _OF_LINE:
-            values = view.each(name)
-            low, high = values.min(axis=0), values.max(axis=0)
-            kept = self._extremes.setdefault(name, np.stack([low, high]))
-            np.minimum(kept[0], low, out=kept[0])
-            np.maximum(kept[1], high, out=kept[1])
+        for name, kept in self._extremes.items():
+            begin, end, _ = self._moving.columns(name).indices(kept.shape[1])
+            native.take_extremes(view.rows, view.columns[name].start, begin, end, kept)
 
     def tables(self) -> dict[str, np.ndarray]:
         """Histories by their paths in a result file, ``time`` among them."""

@@ -85,11 +85,12 @@ void Line::outside(const Work& work, int64_t station, int station_type, Outside&
                 kMostUnknowns];
     const double* position = product.factor + product.places.starts[at] * scenes_;
     const double* velocity = product.velocity + product.places.starts[at] * scenes_;
+    const bool is_damped = kernels_[station_type]->rows.is_damped;
     for (int u = 0, to = 0; u < static_cast<int>(station_types_[station_type].size()); ++u)
         for (int s = 0; s < scenes_; ++s, ++to) {
             const int from = place[u] * scenes_ + s;
             found.position[to] = place[u] < 0 ? 0.0 : position[from];
-            found.velocity[to] = place[u] < 0 ? 0.0 : velocity[from];
+            if (is_damped) found.velocity[to] = place[u] < 0 ? 0.0 : velocity[from];
         }
 }
 
