@@ -162,10 +162,9 @@ bool update(const Window& window, const Motion& motion) {
         range.begin = std::min(range.begin, not_below(window.high, behind));
         range.end = std::max(range.end, above(window.low, ahead));
     }
-    const int64_t end = window.edges(
-        1, std::min(window.n_stations(), std::max(range.end, range.begin + kLeastStations)));
-    const int64_t begin =
-        window.edges(0, std::max<int64_t>(0, std::min(range.begin, end - kLeastStations)));
+    const int64_t end =
+        std::min(window.n_stations(), std::max(range.end, range.begin + kLeastStations));
+    const int64_t begin = std::max<int64_t>(0, std::min(range.begin, end - kLeastStations));
     move(window, motion, begin, end);
     if (window.fading > 0.0) fade(window, motion, first, last);
     return is_fresh;
@@ -175,10 +174,9 @@ void turn_to(const Window& window, int64_t begin, int64_t end) {
     Ends& ends = window.at();
     const int64_t middle = middle_of(begin, end), n = window.n_stations();
     turn(window.kinds, window.turning, ends.middle, middle);
-    // What is at rest beyond an exact window takes its share of a step at one station more, and is
-    // put back: with this, and any time step, its ends are stable.
-    const int64_t beyond = window.is_exact ? 1 : 0;
-    ends = {std::max<int64_t>(0, begin - beyond), std::min(n, end + beyond), begin, end, middle};
+    // The station beyond takes its part in a step, but is then left as it was: so ends are stable
+    // at any time step.
+    ends = {std::max<int64_t>(0, begin - 1), std::min(n, end + 1), begin, end, middle};
     // A link that switches moves stations within the window only; links at its ends do not switch.
     const int64_t inner = begin > 0 ? std::min(begin + window.guard, n) : begin,
                   outer = end < n ? std::max(end - window.guard, inner) : end;

@@ -17,7 +17,6 @@ from catenary import InputError
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.solver.kernels import native
-from catenary.solver.linear import station_factors
 from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import BOUNDED, EXACT, Damping, Problem, WindowChoice
@@ -236,11 +235,9 @@ def test_a_row_is_out_of_date_where_anything_moved_since_it_was_filled() -> None
     assert moved.behind.tolist() == [[0, 10], [0, 10]], "a step was taken elsewhere"
 
 
-def test_no_window_ends_where_elements_are_too_short_to_be_held(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Where the step operator is stiffness more than mass, a held end is unstable: the shipped
-    case has elements of 0.275 m in the spans that a train starts in."""
+def test_a_window_may_end_where_elements_are_short() -> None:
+    """Where the step operator is stiffness more than mass, an end that is held within a step is
+    unstable: the shipped case has elements of 0.275 m in the spans that a train starts in."""
     given = ("train.pantographs=[{name='lumped'}]", "window.mode=bounded")
     spans = ("window.spans_ahead=2", "window.spans_behind=2")
     made = load_scene("ambrosio2012", (*given, *spans))
@@ -248,9 +245,6 @@ def test_no_window_ends_where_elements_are_too_short_to_be_held(
     problem = replace(problem, train=replace(problem.train, end=problem.train.start + 66.0))
     found, _ = steps(problem, mesh, problem.window)
     assert np.abs(found["dropper_force"]).max() < 1e3
-    monkeypatch.setattr(station_factors, "_SOFTENED", 1e9)
-    broken, _ = steps(problem, mesh, problem.window)
-    assert np.abs(broken["dropper_force"]).max() > 1e6
 
 
 def test_a_window_goes_on_after_a_restart_as_if_nothing_had_happened() -> None:
