@@ -173,42 +173,16 @@ class Marches:
         except CatenaryError as error:
             yield from (Marched(number, str(error)) for number in problems)
             return
-        left, by_themselves = dict.fromkeys(problems), list[Marched]()
-
-        def together() -> Iterator[tuple[int, LineAtRest]]:
-            """Yield scenes whose lines have the same matrices; others march in their turn."""
-            for number, problem in problems.items():
-                try:
-                    at_rest = line.rest_of(problem)
-                except CatenaryError as error:
-                    del left[number]
-                    by_themselves.append(Marched(number, str(error)))
-                    continue
-                assert line.shared is not None
-                if line.shared.takes(at_rest):  # with the matrices of the shared line
-                    yield number, at_rest
-                else:
-                    alone_from(number, at_rest)
-
-        def alone_from(number: int, at_rest: LineAtRest) -> None:
-            del left[number]
-            own = scenes[number], problems[number], at_rest
-            by_themselves.append(_alone(line, number, *own))
-
+        left = dict.fromkeys(problems)
         if line.shared is not None:
-            for ended in _by_lots(march_side_by_side(line.shared, together())):
-                if not isinstance(ended, SceneHistory):
-                    continue  # a march by itself says why a train has no place
+            for ended in _by_lots(march_side_by_side(line.shared, line.fitting(problems))):
+                # A march by itself says why a train has no place, and why a step has no forces.
+                if not isinstance(ended, SceneHistory) or ended.is_left or _is_unusual(ended):
+                    continue
                 number = ended.number
-                if ended.is_left or _is_unusual(ended):  # and why a step has no forces
-                    alone_from(number, ended.at_rest)
-                else:
-                    del left[number]
-                    head = line.header(scenes[number], problems[number], ended.at_rest)
-                    yield _done(number, head, *_tables(ended))
-                yield from by_themselves
-                by_themselves.clear()
-        yield from by_themselves
+                del left[number]
+                head = line.header(scenes[number], problems[number], ended.at_rest)
+                yield _done(number, head, *_tables(ended))
         for number in left:
             try:
                 at_rest = line.rest_of(problems[number])
@@ -298,6 +272,18 @@ class _Line:
         hung = self._rest.problem
         of_train = {name: getattr(problem, name) for name in ("train", "contact", "evaluation")}
         return self._rest._replace(problem=replace(hung, **of_train))
+
+    def fitting(self, problems: Mapping[int, Problem]) -> Iterator[tuple[int, LineAtRest]]:
+        """Numbers of the scenes whose lines hang, with the matrices of the shared line, and these
+        lines at rest."""
+        assert self.shared is not None
+        for number, problem in problems.items():
+            try:
+                at_rest = self.rest_of(problem)
+            except CatenaryError:
+                continue
+            if self.shared.takes(at_rest):
+                yield number, at_rest
 
     def header(self, scene: Scene, problem: Problem, at_rest: LineAtRest) -> Header:
         """The head of the results of a scene, of its problem and its line at rest."""
