@@ -18,6 +18,8 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.set_up import STENCIL, derivative
 
 _MM = 1e3
+# Share of the heights that rounding leaves of their differences, of some operations each.
+_ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -176,15 +178,16 @@ def summary(found: RestSensitivity) -> StudyTable:
     for m, parameter in enumerate(found.parameters):
         moved = np.nan_to_num(found.by_height[m])
         place, wire = np.unravel_index(np.abs(moved).argmax(), moved.shape)
-        change = parameter.change
+        change, largest = parameter.change, float(moved[place, wire])
+        is_moved = abs(largest) * parameter.step > _ROUND_OFF * float(np.nanmax(found.height))
         rows.append(
             {
                 "parameter": parameter.key,
                 "shown": parameter.text,
                 "unit": parameter.unit,
                 "change": change,
-                "height": _MM * change * float(moved[place, wire]),
-                "at": float(found.x[place]),
+                "height": _MM * change * largest if is_moved else 0.0,
+                "at": float(found.x[place]) if is_moved else None,
                 "mean": 100.0
                 * change
                 * float(found.by_elasticity[m].sum() / found.elasticity.sum()),
