@@ -35,8 +35,9 @@ from catenary.postproc.record.run_watch import RunWatch
 from catenary.postproc.report.summary import short_summary
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import N_LANES, SharedLine, why_alone
+from catenary.solver.kernels import native
 from catenary.solver.model.model import Model
-from catenary.solver.problem.problem import Problem
+from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, sound_line
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
@@ -55,7 +56,11 @@ class Keeper(Observer):
         self._times: list[np.ndarray] = []
         self._rows: list[np.ndarray] = []
         self._columns: dict[str, np.ndarray] = {}
-        self._extremes: dict[str, np.ndarray] = {}
+        self._moving, sizes = stage.moving, (stage.arm_x.size, stage.dropper_x.size)
+        self._extremes = {
+            name: np.repeat([[np.inf], [-np.inf]], size, axis=1)
+            for name, size in zip(_OF_LINE, sizes, strict=True)
+        }
 
     def next_state(self, step: int) -> int:
         """Rows will do."""
@@ -70,12 +75,9 @@ class Keeper(Observer):
             self._read = np.concatenate([*self._columns.values()])
         self._times.append(view.times.copy())
         self._rows.append(view.rows[:, self._read])
-        for name in _OF_LINE:
-            values = view.each(name)
-            low, high = values.min(axis=0), values.max(axis=0)
-            kept = self._extremes.setdefault(name, np.stack([low, high]))
-            np.minimum(kept[0], low, out=kept[0])
-            np.maximum(kept[1], high, out=kept[1])
+        for name, kept in self._extremes.items():
+            begin, end, _ = self._moving.columns(name).indices(kept.shape[1])
+            native.take_extremes(view.rows, view.columns[name].start, begin, end, kept)
 
     def tables(self) -> dict[str, np.ndarray]:
         """Histories by their paths in a result file, ``time`` among them."""
@@ -100,6 +102,8 @@ _OF_THE_REST = "dropper_lengths"
 # where that may have something to say: of an uplift at an arm [m], a contact force [N], a share of
 # the time without contact.
 _UPLIFT, _FORCE, _LOST = 0.25, 1000.0, 0.1
+# Steps take on what waves have reached: forces are those of the whole line to round-off.
+_REACHED = WindowChoice(EXACT, optional=True)
 # Length of a shared line's columns beyond runs [m]: trains that come later may be longer.
 _BEYOND = 60.0
 
@@ -169,42 +173,16 @@ class Marches:
         except CatenaryError as error:
             yield from (Marched(number, str(error)) for number in problems)
             return
-        left, by_themselves = dict.fromkeys(problems), list[Marched]()
-
-        def together() -> Iterator[tuple[int, LineAtRest]]:
-            """Yield scenes whose lines have the same matrices; others march in their turn."""
-            for number, problem in problems.items():
-                try:
-                    at_rest = line.rest_of(problem)
-                except CatenaryError as error:
-                    del left[number]
-                    by_themselves.append(Marched(number, str(error)))
-                    continue
-                assert line.shared is not None
-                if line.shared.takes(at_rest):  # with the matrices of the shared line
-                    yield number, at_rest
-                else:
-                    alone_from(number, at_rest)
-
-        def alone_from(number: int, at_rest: LineAtRest) -> None:
-            del left[number]
-            own = scenes[number], problems[number], at_rest
-            by_themselves.append(_alone(line, number, *own))
-
+        left = dict.fromkeys(problems)
         if line.shared is not None:
-            for ended in _by_lots(march_side_by_side(line.shared, together())):
-                if not isinstance(ended, SceneHistory):
-                    continue  # a march by itself says why a train has no place
+            for ended in _by_lots(march_side_by_side(line.shared, line.fitting(problems))):
+                # A march by itself says why a train has no place, and why a step has no forces.
+                if not isinstance(ended, SceneHistory) or ended.is_left or _is_unusual(ended):
+                    continue
                 number = ended.number
-                if ended.is_left or _is_unusual(ended):  # and why a step has no forces
-                    alone_from(number, ended.at_rest)
-                else:
-                    del left[number]
-                    head = line.header(scenes[number], problems[number], ended.at_rest)
-                    yield _done(number, head, *_tables(ended))
-                yield from by_themselves
-                by_themselves.clear()
-        yield from by_themselves
+                del left[number]
+                head = line.header(scenes[number], problems[number], ended.at_rest)
+                yield _done(number, head, *_tables(ended))
         for number in left:
             try:
                 at_rest = line.rest_of(problems[number])
@@ -295,6 +273,18 @@ class _Line:
         of_train = {name: getattr(problem, name) for name in ("train", "contact", "evaluation")}
         return self._rest._replace(problem=replace(hung, **of_train))
 
+    def fitting(self, problems: Mapping[int, Problem]) -> Iterator[tuple[int, LineAtRest]]:
+        """Numbers of the scenes whose lines hang, with the matrices of the shared line, and these
+        lines at rest."""
+        assert self.shared is not None
+        for number, problem in problems.items():
+            try:
+                at_rest = self.rest_of(problem)
+            except CatenaryError:
+                continue
+            if self.shared.takes(at_rest):
+                yield number, at_rest
+
     def header(self, scene: Scene, problem: Problem, at_rest: LineAtRest) -> Header:
         """The head of the results of a scene, of its problem and its line at rest."""
         attributes = {
@@ -360,8 +350,10 @@ def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.
 
 
 def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineAtRest) -> Marched:
-    """March a scene by itself."""
+    """March a scene by itself, only the part of its line that waves have reached."""
     keeper, dt = Keeper(), problem.numerics.dt
+    if not rest.problem.window.moves:
+        rest = rest._replace(problem=replace(rest.problem, window=_REACHED))
     try:
         with March(alone(), *rest) as march:
             watch = RunWatch(alone(), rest)

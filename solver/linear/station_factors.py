@@ -24,8 +24,6 @@ from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 
 # Distance in stations between the places at which elimination may end, if there are several.
 MIDDLES = native.MIDDLES
-# Sum of the eigenvalues of S^-1 A - 1 where steps of a part of the line may end.
-_SOFTENED = 1.0
 
 
 class Turning(NamedTuple):
@@ -35,50 +33,15 @@ class Turning(NamedTuple):
     ----------
     to_end, to_start : (n,) kind of each station if elimination ends behind it, or before it
     here : (m,) kind of every station number i ``MIDDLES`` if elimination ends there
-    begins, ends : (n + 1,) nearest stations outwards of each where steps of a part of the line may
-        begin and end, see ``edges``
     """
 
     to_end: np.ndarray
     to_start: np.ndarray
     here: np.ndarray
-    begins: np.ndarray
-    ends: np.ndarray
 
     def place(self, low: int, high: int) -> int:
         """A station where it may end, near the middle from ``low`` to ``high``."""
         return int(native.middle_of(low, high))
-
-
-def softened(whole: np.ndarray, eliminated: np.ndarray) -> np.ndarray:
-    """Whether steps of a part of the line may end at stations (k,).
-
-    Stations beyond are held, but the factors let them give way by their mass and stiffness,
-    D = A - S, with the block A of the step operator and S, the same block after elimination. At the
-    end this leaves M + tau C - D in place of M + tau C, which must remain positive definite; where
-    elements are so short that A is mostly stiffness it does not. All eigenvalues of S^-1 A must be
-    below 2.
-
-    ``whole`` (k, b, b) and ``eliminated`` (k, b, b) are A and S^-1 of each.
-    """
-    traces = np.einsum("kij,kji->k", eliminated, whole)
-    return np.asarray(traces - whole.shape[1] < _SOFTENED)
-
-
-def edges(towards_end: np.ndarray, towards_start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Stations where steps of a part of the line may begin and end, from each outwards, (n + 1,).
-
-    ``towards_end`` and ``towards_start`` (n,) are results of ``softened`` for each station, after
-    elimination from the start towards the end and the other way round.
-    """
-    n = towards_end.size
-    number = np.arange(n + 1)
-    can_begin = np.append(towards_end, True)
-    can_end = np.append(True, towards_start)
-    can_begin[0] = can_end[n] = True
-    begins = np.maximum.accumulate(np.where(can_begin, number, 0))
-    ends = np.minimum.accumulate(np.where(can_end, number, n)[::-1])[::-1]
-    return begins, ends
 
 
 class StationBlocks(NamedTuple):
@@ -224,9 +187,7 @@ def station_factors(
     of_station = kinds[found.numbers]
     if not turns:
         return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, besides)
-    soft = softened(rows.blocks[1][found.kinds], found.factors[:, 0])[found.numbers]
-    begins, ends = edges(soft[:n], soft[n : 2 * n])
-    turning = Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :], begins, ends)
+    turning = Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :])
     of_station = of_station[:n].copy()
     return StationFactors(
         layout, stations, of_station, numbers, low, high, n_kinds, besides, turning

@@ -38,6 +38,7 @@ from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.matrices import columns_of, part_of
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
+from catenary.solver.problem.problem import BOUNDED
 
 
 class StepArrays:
@@ -219,8 +220,8 @@ class LineOperators:
         arrays, read = self._arrays, self._arrays.padded
         rates = arrays.padded_rates if damped else read
         by_mass = 0.0
-        # Beyond the ends of a window the state is not zero, which A^-1 A x would need.
-        if shares is not None and not self._model.problem.window.moves:
+        # Beyond the ends of a bounded window the state is not zero, which A^-1 A x would need.
+        if shares is not None and self._model.problem.window.mode != BOUNDED:
             instead = self._products.instead_of_stiffness(*shares)
             if instead is not None:
                 product, by_mass = instead, 1.0 / shares[1]

@@ -3,15 +3,31 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import linalg
 
 from catenary.base.errors import RunBroken
+from catenary.solver.kernels import native
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 
 # Unknowns whose bands are put together at once, some ninety spans of two wires: entries of a
 # hundred elements take nearly as long as those of a thousand.
 _AT_ONCE = 2**14
+
+
+def solve_banded(bands: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Answers (n, m) of a positive definite matrix to right-hand sides ``right`` of the same shape,
+    which are overwritten; its lower ``bands`` (k, m) are as LAPACK takes them. Not collective.
+
+    SciPy's solver takes one right-hand side at a time, this one as many as a vector has lanes.
+
+    Raises
+    ------
+    LinAlgError
+        If the matrix is not positive definite.
+    """
+    if not native.solve_bands(np.ascontiguousarray(bands), right):
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    return right
 
 
 class OperatorBands:
@@ -56,14 +72,10 @@ class OperatorBands:
         RunBroken
             If A is not positive definite there.
         """
-        bands = self.between(first, last, further)
         try:
-            answers = linalg.solveh_banded(
-                bands, right.T, overwrite_b=True, lower=True, check_finite=False
-            )
-        except linalg.LinAlgError as error:
+            return solve_banded(self.between(first, last, further), right)
+        except np.linalg.LinAlgError as error:
             raise RunBroken("the step operator cannot be factored: it is not positive") from error
-        return np.asarray(answers.T)
 
     def _put_together(self, first: int, last: int) -> None:
         parts = list(iterate_entries(self._model, first, last, *self._coefficients))

@@ -90,7 +90,8 @@ class WindowChoice:
     ``mode`` is ``off`` (all), ``exact`` (all that any wave has reached) or ``bounded``: those whose
     motion exceeds ``tolerance`` times the largest one of the line, or those from ``spans_behind``
     behind the last pantograph to ``spans_ahead`` ahead of the first one. Both ends of the window
-    are damped on mass, by ``fading`` [m2/s] over the square of their length.
+    are damped on mass, by ``fading`` [m2/s] over the square of their length. An ``optional`` one is
+    left out where steps take on the whole line; another is refused there.
     """
 
     mode: str = OFF
@@ -98,6 +99,7 @@ class WindowChoice:
     spans_ahead: float = 0.0
     spans_behind: float = 0.0
     fading: float = 0.0
+    optional: bool = False
 
     @property
     def moves(self) -> bool:

@@ -26,7 +26,7 @@ from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import ChangedLine
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
-from catenary.solver.window.choice import refuse_window
+from catenary.solver.window.choice import opens_window
 from catenary.solver.window.moving_window import MovingWindow, wanted_pieces
 
 
@@ -104,7 +104,7 @@ class SchemeFactory:
             pantographs.across,
             pantographs.work,
         )
-        if problem.window.moves:
+        if opens_window(problem, comm.size, line.passes is not None):
             self._open_window(problem, model, line, interaction, pantographs)
         scheme = SCHEMES[numerics.scheme](own, problem, model, interaction, pantographs)
         return Parts(line, interaction, pantographs, scheme)
@@ -117,8 +117,7 @@ class SchemeFactory:
         interaction: ForcesOnLine,
         pantographs: Pantographs,
     ) -> None:
-        """Restrict steps of the line to a window at the train. Collective: refuses on all ranks."""
-        refuse_window(problem, self.comm.size, line.passes is not None)
+        """Restrict steps of the line to a window at the train. One rank only."""
         assert line.passes is not None
         links, reach = interaction.links, interaction.reach
         window = MovingWindow(

@@ -187,8 +187,8 @@ def why_no_window(problem: Problem) -> str:
     return ""
 
 
-def refuse_window(problem: Problem, n_ranks: int, by_stations: bool) -> None:
-    """Raise InputError if a problem wants a window that is not possible.
+def opens_window(problem: Problem, n_ranks: int, by_stations: bool) -> bool:
+    """Whether steps of a problem are taken in a window.
 
     Parameters
     ----------
@@ -198,11 +198,19 @@ def refuse_window(problem: Problem, n_ranks: int, by_stations: bool) -> None:
         Number of ranks that step the line.
     by_stations : bool
         Whether steps are taken in two passes over stations.
+
+    Raises
+    ------
+    InputError
+        If the problem wants a window that is not possible.
     """
+    if not problem.window.moves:
+        return False
     why = why_no_window(problem)
     if not why and n_ranks > 1:
         why = f"the run has {n_ranks} ranks, and all that moves is on one: start it without mpirun"
     if not why and not by_stations:
         why = "this line, or an option of PETSc, does not let it be stepped by stations"
-    if why:
+    if why and not problem.window.optional:
         raise InputError(f"window.mode is {problem.window.mode}, which cannot be here, as {why}")
+    return not why

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces, WantedPieces
 from catenary.solver.linear.station_factors import StationFactors, Turning
@@ -45,7 +43,6 @@ class WindowArrays(NamedTuple):
     low, high : (n,) of stations, see ``Unknowns``
     starts : (n + 1,) first unknown of each station
     links_before : (n + 1,) number of links before each station
-    edges : (2, n + 1) station where a window that should begin, or end, at a station does so
     ends, kinds, turning : of ``StationFactors``
     links : (2,) the first link that may switch and the one after the last
     ranges : (2, 2) the same for the pass back, see ``StationPasses.track_links``
@@ -69,7 +66,6 @@ class WindowArrays(NamedTuple):
     high: np.ndarray
     starts: np.ndarray
     links_before: np.ndarray
-    edges: np.ndarray
     ends: np.ndarray
     kinds: np.ndarray
     turning: Turning
@@ -77,8 +73,6 @@ class WindowArrays(NamedTuple):
     ranges: np.ndarray
     known: np.ndarray
 
-
-logger = logging.getLogger(__name__)
 
 # Steps from one look to the next.
 EVERY = 8
@@ -153,7 +147,6 @@ class MovingWindow:
             high=np.ascontiguousarray(numbering.high),
             starts=starts,
             links_before=before.astype(np.int64),
-            edges=np.stack([factors.turning.begins, factors.turning.ends]),
             ends=factors.ends,
             kinds=factors.kinds,
             turning=factors.turning,
@@ -165,22 +158,6 @@ class MovingWindow:
         self._operators = operators
         # First station of the pieces that are there and the one after the last.
         self._covered = 0, 0
-        if operators is None:
-            self._tell_growth()
-
-    def _tell_growth(self) -> None:
-        """Say so where ends of the window stand much further out than was asked for."""
-        low, masts, (begins, ends) = self.arrays.low, self.arrays.masts, self.arrays.edges
-        x = np.append(low, self.arrays.high[-1])
-        further = max(float((x - x[begins]).max()), float((x[ends] - x).max()))
-        if further > (masts[-1] - masts[0]) / (masts.size - 1):
-            logger.warning(
-                "elements are so short for the time step that the window cannot end at every "
-                "station: it reaches up to %.0f m further than its %s; take a smaller "
-                "mesh.elements_per_gap or numerics.dt_s",
-                further,
-                "motion asks for" if self.arrays.by_motion > 0.0 else "spans",
-            )
 
     def provide(self, way: float) -> None:
         """Have what steps need until contacts are a ``way`` [m] further, at most ``MOST_STEPS``.
@@ -188,7 +165,7 @@ class MovingWindow:
         Raises
         ------
         RunBroken
-            If the window can end nowhere near, or the line cannot be factored there.
+            If the line cannot be factored there.
         """
         if self._operators is None:
             return
@@ -206,7 +183,7 @@ class MovingWindow:
         if not arrays.state[IS_FRESH]:
             begin, end = min(begin, int(arrays.ends[2])), max(end, int(arrays.ends[3]))
         if not self._is_covered(begin - _AROUND, end + _AROUND):
-            self._cover(begin, end)
+            self._have(max(0, begin - _AROUND), min(n, end + _AROUND))
 
     def _spans_around(self, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
         """Ends of a window of spans around contacts from ``first`` to ``last`` [m]: as numbers of
@@ -251,36 +228,10 @@ class MovingWindow:
         n = self.arrays.low.size
         return self._covered[0] <= max(0, begin) and min(n, end) <= self._covered[1]
 
-    def _cover(self, begin: int, end: int) -> None:
-        """Have the stations from ``begin`` to before ``end``, and where a window of these ends."""
-        assert self._operators is not None
-        pieces, (begins, ends) = self._operators.pieces, self.arrays.edges
-        first, last, n = begin, end, self.arrays.low.size
-        while True:
-            first, last = max(0, first - _AROUND), min(n, last + _AROUND)
-            if last - first > pieces.size * (pieces.n_slots - 1):
-                raise RunBroken(
-                    f"elements near {self.arrays.low[begin]:.0f} m are so short for the time step "
-                    "that a window cannot end there; take a smaller mesh.elements_per_gap or "
-                    "numerics.dt_s"
-                )
-            self._have(first, last)
-            low, high = self._covered
-            first = min(first, int(begins[begin])) if begins[begin] >= 0 else low - 1
-            last = max(last, int(ends[end])) if ends[end] <= n else high + 1
-            if self._is_covered(first, last):
-                return
-
     def _have(self, begin: int, end: int) -> None:
-        """Have pieces with the stations from ``begin`` to before ``end``, and mark where windows in
-        them begin and end: beyond the line, where none does in these pieces."""
+        """Have pieces with the stations from ``begin`` to before ``end``."""
         assert self._operators is not None
-        factors, (begins, ends) = self._operators.factors, self.arrays.edges
-        low, high = self._covered = self._operators.pieces.cover(begin, end)
-        number = np.arange(low, high + 1)
-        begins[number] = np.maximum.accumulate(np.where(factors.can_begin[number], number, -1))
-        backwards = np.where(factors.can_end[number], number, begins.size)[::-1]
-        ends[number] = np.minimum.accumulate(backwards)[::-1]
+        self._covered = self._operators.pieces.cover(begin, end)
 
     @property
     def unknowns(self) -> tuple[int, int]:

@@ -88,8 +88,8 @@ void TwoPasses::before() {
     int64_t begin = 0, end = size(motion.x);
     if (window_) {
         if (update(*window_, motion)) reserves(motion, tracked_.links, tracked_.reserve);
-        begin = window_->starts[window_->at().begin];
-        end = window_->starts[window_->at().end];
+        begin = window_->starts[window_->at().low];
+        end = window_->starts[window_->at().high];
     }
     predict_velocities(begin, end);
 }

@@ -36,7 +36,7 @@ double place_of_span(std::span<const double> masts, double number) {
 /// Find the largest motion in the window.
 void find_peak(const Window& window, const Motion& motion) {
     double largest_x = 0.0, largest_y = 0.0;
-    for (int64_t i = window.starts[window.at().begin]; i < window.starts[window.at().end]; ++i) {
+    for (int64_t i = window.starts[window.at().low]; i < window.starts[window.at().high]; ++i) {
         largest_x = std::max(largest_x, std::abs(motion.x[i]));
         largest_y = std::max(largest_y, std::abs(motion.y[i]));
     }
@@ -47,8 +47,8 @@ void find_peak(const Window& window, const Motion& motion) {
 /// Whether any of the stations from `begin` to `end` moves, or holds NaN.
 bool moves(const Window& window, const Motion& motion, int64_t begin, int64_t end) {
     const double of_x = window.by_motion * window.peak[0], of_y = window.by_motion * window.peak[1];
-    begin = std::max(begin, window.at().begin);
-    end = std::max(begin, std::min(end, window.at().end));
+    begin = std::max(begin, window.at().low);
+    end = std::max(begin, std::min(end, window.at().high));
     for (int64_t i = window.starts[begin]; i < window.starts[end]; ++i)
         if (!(std::abs(motion.x[i]) <= of_x && std::abs(motion.y[i]) <= of_y)) return true;
     return false;
@@ -61,7 +61,7 @@ struct Range {
 /// Stations that move, at least the range `least`.
 Range follow_motion(const Window& window, const Motion& motion, Range least) {
     const int64_t guard = window.guard;
-    int64_t low = window.at().begin, high = window.at().end;
+    int64_t low = window.at().low, high = window.at().high;
     if (moves(window, motion, low, low + guard)) {
         low = std::max<int64_t>(0, low - guard);
     } else {
@@ -89,8 +89,8 @@ void rest(const Window& window, const Motion& motion, int64_t begin, int64_t end
 /// Move the window to the stations from `begin` to `end`; stations that leave it come to rest.
 void move(const Window& window, const Motion& motion, int64_t begin, int64_t end) {
     const Ends before = window.at();
-    rest(window, motion, before.begin, std::min(begin, before.end));
-    rest(window, motion, std::max(end, before.begin), before.end);
+    rest(window, motion, before.low, std::min(begin, before.high));
+    rest(window, motion, std::max(end, before.low), before.high);
     turn_to(window, begin, end);
 }
 
@@ -121,7 +121,7 @@ void slow_down(const Window& window, const Motion& motion, int64_t station, doub
 /// envelope obeys Schroedinger's equation, i a_t = -D / 2 a_xx, and damping that begins at once
 /// sends them back, however little it is: so it grows, as slowly as the length allows.
 void fade(const Window& window, const Motion& motion, double first, double last) {
-    const int64_t begin = window.at().begin, end = window.at().end;
+    const int64_t begin = window.at().low, end = window.at().high;
     const auto &low = window.low, &high = window.high;
     const double behind = kBehind * (first - low[begin]), ahead = kAhead * (high[end - 1] - last);
     for (int64_t i = begin; begin > 0 && i < end && high[i] < low[begin] + behind; ++i) {
@@ -162,10 +162,9 @@ bool update(const Window& window, const Motion& motion) {
         range.begin = std::min(range.begin, not_below(window.high, behind));
         range.end = std::max(range.end, above(window.low, ahead));
     }
-    const int64_t end = window.edges(
-        1, std::min(window.n_stations(), std::max(range.end, range.begin + kLeastStations)));
-    const int64_t begin =
-        window.edges(0, std::max<int64_t>(0, std::min(range.begin, end - kLeastStations)));
+    const int64_t end =
+        std::min(window.n_stations(), std::max(range.end, range.begin + kLeastStations));
+    const int64_t begin = std::max<int64_t>(0, std::min(range.begin, end - kLeastStations));
     move(window, motion, begin, end);
     if (window.fading > 0.0) fade(window, motion, first, last);
     return is_fresh;
@@ -175,7 +174,9 @@ void turn_to(const Window& window, int64_t begin, int64_t end) {
     Ends& ends = window.at();
     const int64_t middle = middle_of(begin, end), n = window.n_stations();
     turn(window.kinds, window.turning, ends.middle, middle);
-    ends = {begin, end, begin, end, middle};
+    // The station beyond takes its part in a step, but is then left as it was: so ends are stable
+    // at any time step.
+    ends = {std::max<int64_t>(0, begin - 1), std::min(n, end + 1), begin, end, middle};
     // A link that switches moves stations within the window only; links at its ends do not switch.
     const int64_t inner = begin > 0 ? std::min(begin + window.guard, n) : begin,
                   outer = end < n ? std::max(end - window.guard, inner) : end;

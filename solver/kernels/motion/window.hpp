@@ -27,19 +27,16 @@ struct Window {
     std::span<const double> low, high;  ///< where stations begin and end [m]
     std::span<const int64_t> starts;    ///< (n + 1,) first unknown of each
     std::span<const int64_t> links_before;  ///< (n + 1,) how many links stand before each
-    Array2<const int64_t>
-        edges;                 ///< (2, n + 1) where a window that is to begin, or end, there does
-    std::span<int64_t> ends;   ///< of `Ends`
-    std::span<int32_t> kinds;  ///< of factors
+    std::span<int64_t> ends;                ///< of `Ends`
+    std::span<int32_t> kinds;               ///< of factors
     Turning turning;
     std::span<int64_t> links;  ///< the first link that may switch and the one after the last
     Array2<int64_t> ranges;    ///< (2, 2) the same for the pass back, see `left_behind`
     std::span<double> known;   ///< known accelerations beside x, y and z, if the motion has them
     CATENARY_RECORD(state, every, guard, by_motion, spans_behind, spans_ahead, fading, is_exact,
-                    peak, contacts, loaded, margin, masts, low, high, starts, links_before, edges,
-                    ends, kinds, turning, links, ranges, known)
-    CATENARY_SHAPES(
-        "2, *, *, *, *, *, *, *, 2, *, 2, *, *, n, n, n+1, n+1, 2 n+1, 5, *, *, 2, 2 2, *")
+                    peak, contacts, loaded, margin, masts, low, high, starts, links_before, ends,
+                    kinds, turning, links, ranges, known)
+    CATENARY_SHAPES("2, *, *, *, *, *, *, *, 2, *, 2, *, *, n, n, n+1, n+1, 5, *, *, 2, 2 2, *")
 
     int64_t n_stations() const { return size(low); }
     Ends& at() const { return *reinterpret_cast<Ends*>(ends.data()); }

@@ -67,7 +67,8 @@ int64_t Line::start_of(const Work& work, int64_t station) const {
 
 void Line::convert(int from, int to, Station& station) const {
     if (from == to) return;
-    const Station given = station;
+    Station given;  // all of it takes longer to copy than what there is to convert
+    std::copy_n(station.unknowns, station_types_[from].size() * scenes_, given.unknowns);
     const int8_t* place = &place_[(from * station_types_.size() + to) * kMostUnknowns];
     double* unknown = station.unknowns;
     for (size_t u = 0; u < station_types_[to].size(); ++u)
@@ -84,11 +85,12 @@ void Line::outside(const Work& work, int64_t station, int station_type, Outside&
                 kMostUnknowns];
     const double* position = product.factor + product.places.starts[at] * scenes_;
     const double* velocity = product.velocity + product.places.starts[at] * scenes_;
+    const bool is_damped = kernels_[station_type]->rows.is_damped;
     for (int u = 0, to = 0; u < static_cast<int>(station_types_[station_type].size()); ++u)
         for (int s = 0; s < scenes_; ++s, ++to) {
             const int from = place[u] * scenes_ + s;
             found.position[to] = place[u] < 0 ? 0.0 : position[from];
-            found.velocity[to] = place[u] < 0 ? 0.0 : velocity[from];
+            if (is_damped) found.velocity[to] = place[u] < 0 ? 0.0 : velocity[from];
         }
 }
 
@@ -105,7 +107,7 @@ void Line::put_outside(const Work& work, Chain& chain, int station_type, int ste
 }
 
 void Line::multiply(const Work& work, int64_t begin, int64_t end, double* result) const {
-    Chain chain;
+    Chain chain{};
     for (int64_t i = begin; i < end; i += chain.n) {
         chain.run = &run_of(i);
         chain.first = i;

@@ -95,6 +95,7 @@ struct Station {
 /// Displacement and velocity of a station outside of a run, in the order of the run's station type.
 struct Outside {
     double position[kMostNumbers], velocity[kMostNumbers];
+    Outside() {}  // of most chains nothing is outside: zeros would take longer than the chain
 };
 /// A chain of n stations of one run: from `first` on, towards the end of the line or its start.
 struct Chain {

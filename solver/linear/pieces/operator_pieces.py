@@ -20,7 +20,6 @@ from catenary.solver.linear.station_factors import (
     layout_of_factors,
     packed_blocks,
     packed_factors,
-    softened,
     station_factors,
 )
 from catenary.solver.linear.stations.like_stations import LikeStations
@@ -49,8 +48,6 @@ class FactorPieces:
     Attributes
     ----------
     factors : StationFactors; those of stations in other pieces are not to be used
-    can_begin, can_end : (n + 1,) whether steps of a part of the line may begin and end at each
-        station of these pieces
 
     Parameters
     ----------
@@ -72,14 +69,10 @@ class FactorPieces:
         besides = np.zeros(n, dtype=np.int32), self._besides.numbers
         kinds = np.zeros(n, dtype=np.int32)
         here = np.zeros(-(-n // MIDDLES), dtype=np.int32)
-        edges = np.zeros((2, n + 1), dtype=np.int64)
-        self._turning = Turning(kinds.copy(), kinds.copy(), here, *edges)
+        self._turning = Turning(kinds.copy(), kinds.copy(), here)
         self.factors = StationFactors(
             layout, stations, kinds, self._blocks.numbers, 0, n, 0, besides, self._turning
         )
-        self.can_begin, self.can_end = np.zeros((2, n + 1), dtype=bool)
-        # A line may always end where it does.
-        self.can_begin[[0, n]] = self.can_end[[0, n]] = True
 
     def make(self, piece: Piece, rows: StationRows) -> None:
         """Compute the factors of a piece from the ``rows`` of the operator in its stretch.
@@ -105,9 +98,6 @@ class FactorPieces:
         turning.to_end[begin:end], turning.to_start[begin:end] = kinds[: 2 * size].reshape(2, -1)
         turning.here[-(-begin // MIDDLES) : -(-end // MIDDLES)] = kinds[2 * size :]
         self._turn(piece)
-        soft = softened(whole.blocks[1][found.kinds], found.factors[:, 0])[place]
-        self.can_begin[begin:end] |= soft[:size]
-        self.can_end[begin + 1 : end + 1] |= soft[size : 2 * size]
         besides = besides_of(self._layout, stations.part(own.start, own.stop), rows.part(own))
         if besides is None:
             raise RunBroken(JOINED_OTHERWISE)

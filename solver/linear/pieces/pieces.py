@@ -69,9 +69,8 @@ class Pieces:
         beyond = most_within(numbering, _BEYOND * reach)
         self._beyond = MIDDLES * (beyond // MIDDLES + 1)
         self.size = _SIZE
-        # A window begins and ends anywhere in a piece, and a further one to either side is looked
-        # at for where it may end.
-        self.n_slots = (most_within(numbering, length) + around) // self.size + 5
+        # A window begins and ends anywhere in a piece.
+        self.n_slots = (most_within(numbering, length) + around) // self.size + 2
         self.edges = np.append(np.arange(0, n, self.size), n)
         self._slots = np.full(self.edges.size - 1, -1)
         self._makers: list[Maker] = []

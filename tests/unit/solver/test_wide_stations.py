@@ -16,7 +16,7 @@ from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.problem import Damping, Numerics, WindowChoice
+from catenary.solver.problem.problem import BOUNDED, EXACT, Damping, Numerics, WindowChoice
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 STEPS = 40
@@ -78,9 +78,9 @@ def test_what_is_not_a_sum_of_mass_and_stiffness_is_multiplied_with_both() -> No
     made.destroy()
 
 
-def test_a_window_beyond_which_the_line_is_bent_multiplies_with_stiffness() -> None:
-    moving = replace(model().problem, window=WindowChoice("exact"))
-    assert moving.window.moves
+@pytest.mark.parametrize("mode", [EXACT, BOUNDED])
+def test_a_window_beyond_which_the_line_is_bent_multiplies_with_stiffness(mode: str) -> None:
+    moving = replace(model().problem, window=WindowChoice(mode, None, 2, 2))
     made = line(replace(model(), problem=moving), NEWMARK)
-    assert made.passes is not None and not made.passes.by_mass
+    assert made.passes is not None and made.passes.by_mass == (mode == EXACT)
     made.destroy()

@@ -104,20 +104,6 @@ def test_a_march_in_pieces_goes_on_after_a_restart_as_if_nothing_had_happened() 
 
 
 @pytest.mark.usefixtures("small")
-def test_a_piece_where_no_window_can_end_breaks_the_run_in_words(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    problem, mesh = scene(0.1)
-    monkeypatch.setattr(
-        operator_pieces, "softened", lambda whole, _: np.zeros(len(whole), dtype=bool)
-    )
-    march, _ = start_march(problem, mesh)
-    with march:
-        outcome = march.run([])
-    assert "so short for the time step that a window cannot end there" in outcome.outcome
-
-
-@pytest.mark.usefixtures("small")
 @pytest.mark.parametrize(
     ("margin", "goes_on"), [(0.85, True), pytest.param(0.5, False, marks=pytest.mark.study)]
 )
