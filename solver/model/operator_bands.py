@@ -14,22 +14,6 @@ from catenary.solver.model.model import Model
 _AT_ONCE = 2**14
 
 
-def solve_banded(bands: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Answers (n, m) of a positive definite matrix to right-hand sides ``right`` of the same shape,
-    which are overwritten; its lower ``bands`` (k, m) are as LAPACK takes them. Not collective.
-
-    SciPy's solver takes one right-hand side at a time, this one as many as a vector has lanes.
-
-    Raises
-    ------
-    LinAlgError
-        If the matrix is not positive definite.
-    """
-    if not native.solve_bands(np.ascontiguousarray(bands), right):
-        raise np.linalg.LinAlgError("the matrix is not positive definite")
-    return right
-
-
 class OperatorBands:
     """Lower bands of A, as LAPACK takes them. Not collective.
 
@@ -72,10 +56,10 @@ class OperatorBands:
         RunBroken
             If A is not positive definite there.
         """
-        try:
-            return solve_banded(self.between(first, last, further), right)
-        except np.linalg.LinAlgError as error:
-            raise RunBroken("the step operator cannot be factored: it is not positive") from error
+        bands = np.ascontiguousarray(self.between(first, last, further))
+        if not native.solve_bands(bands, right):
+            raise RunBroken("the step operator cannot be factored: it is not positive")
+        return right
 
     def _put_together(self, first: int, last: int) -> None:
         parts = list(iterate_entries(self._model, first, last, *self._coefficients))

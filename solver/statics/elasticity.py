@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import linalg
 
 from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
@@ -15,7 +16,7 @@ from catenary.meshgen.wires import Role
 from catenary.solver.effects.build_model import with_wires_apart
 from catenary.solver.model.link_directions import at_nodes, at_places
 from catenary.solver.model.model import Model
-from catenary.solver.model.operator_bands import OperatorBands, solve_banded
+from catenary.solver.model.operator_bands import OperatorBands
 
 # Length of line to both sides of a stretch in the first solution [m], and motion that is none.
 _FIRST_REACH, _STILL = 1500.0, 1e-13
@@ -111,7 +112,12 @@ def _of_stretch(model: Model, stiffness: OperatorBands, x_from: float, x_to: flo
         places = [at_places(model, wire, x) for wire in wires]
         present = np.stack([_is_there(model, wire, x) for wire in wires], axis=1)
         x_from, x_to = _element_ends(model, x_from, x_to)
-    first, bands = _seen_from(model, stiffness, x_from, x_to)
+    try:
+        first, factor = _seen_from(model, stiffness, x_from, x_to)
+    except linalg.LinAlgError as error:
+        raise InputError(
+            "the contact wires have no elasticity: the line at rest is unstable"
+        ) from error
     # A held wire does not give way; the one that the matrix has there is no spring.
     weights = [
         np.where(np.isin(place.unknowns, model.constrained), 0.0, place.weights) for place in places
@@ -121,26 +127,16 @@ def _of_stretch(model: Model, stiffness: OperatorBands, x_from: float, x_to: flo
         for place, own in zip(places, weights, strict=True)
     ]
     compliance = np.full((x.size, len(places), len(places)), np.nan)
-    size, pressed = bands.shape[1], np.argwhere(present)
+    size, pressed = factor.shape[1], np.argwhere(present)
     for some in np.array_split(pressed, 1 + pressed.shape[0] * size // _AT_ONCE):
         loads = np.zeros((len(some), size))
         for load, (i, j) in zip(loads, some, strict=True):
             np.add.at(load, unknowns[j][i], weights[j][i])
-        for motion, (i, j) in zip(_moved(bands, loads), some, strict=True):
+        moved = linalg.cho_solve_banded((factor, True), loads.T, overwrite_b=True).T
+        for motion, (i, j) in zip(moved, some, strict=True):
             for k in np.flatnonzero(present[i]):
                 compliance[i, k, j] = motion[unknowns[k][i]] @ weights[k][i]
     return Elasticity(x, compliance)
-
-
-def _moved(bands: np.ndarray, loads: np.ndarray) -> np.ndarray:
-    """Static motion of a part of the line with lower ``bands`` under ``loads``, see
-    ``solve_banded``."""
-    try:
-        return solve_banded(bands, loads)
-    except np.linalg.LinAlgError as error:
-        raise InputError(
-            "the contact wires have no elasticity: the line at rest is unstable"
-        ) from error
 
 
 def _under(height: np.ndarray, compliance: np.ndarray, force: float) -> float:
@@ -198,7 +194,7 @@ def _seen_from(
     model: Model, stiffness: OperatorBands, x_from: float, x_to: float
 ) -> tuple[int, np.ndarray]:
     """Stiffness of what stands in a stretch, all else eliminated: its first unknown, and lower
-    bands."""
+    bands of Cholesky's factor."""
     numbering, width, reach = model.numbering, model.numbering.width, _FIRST_REACH
     first, last = numbering.within(x_from, x_to)
     while True:
@@ -214,7 +210,7 @@ def _seen_from(
         ends += [behind[-width:]] if high < numbering.size else []
         most = _STILL * max(np.abs(motion).max(initial=0.0) for motion in (before, behind))
         if all(np.abs(motion).max(initial=0.0) <= most for motion in ends):
-            return begin, condensed
+            return begin, linalg.cholesky_banded(condensed, overwrite_ab=True, lower=True)
         reach *= 4.0
 
 
@@ -230,15 +226,15 @@ def _condensed(
     inner = bands[:, first:last].copy()
     before = behind = np.zeros((0, k))
     if first > 0:
-        across, pulls = _across(bands, first), np.zeros((k, first))
-        pulls[:, -k:] = across
-        before = _moved(bands[:, :first], pulls).T
-        _subtract(inner[:, :k], across @ before[-k:])
+        pulls = np.zeros((first, k))
+        pulls[-k:] = _across(bands, first).T
+        before = linalg.solveh_banded(bands[:, :first], pulls, lower=True)
+        _subtract(inner[:, :k], pulls[-k:].T @ before[-k:])
     if last < size:
-        across, pulls = _across(bands, last), np.zeros((k, size - last))
-        pulls[:, :k] = across.T
-        behind = _moved(bands[:, last:], pulls).T
-        _subtract(inner[:, -k:], across.T @ behind[:k])
+        pulls = np.zeros((size - last, k))
+        pulls[:k] = _across(bands, last)
+        behind = linalg.solveh_banded(bands[:, last:], pulls, lower=True)
+        _subtract(inner[:, -k:], pulls[:k].T @ behind[:k])
     return inner, before, behind
 
 
