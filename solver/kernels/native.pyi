@@ -122,7 +122,6 @@ join: Kernel
 
 condense_spans: Kernel
 cut_out: Kernel
-solve_bands: Kernel
 bridge: Kernel
 add_waves: Kernel
 

@@ -230,7 +230,7 @@ class UnitResponses:
         right = np.zeros((n * each, last - first))
         column = np.repeat(np.arange(n * each), dofs.shape[2])
         np.add.at(right, (column, dofs.ravel() - first), weights.ravel())
-        return self._bands.solve(first, last, right, further)
+        return np.ascontiguousarray(self._bands.solve(first, last, right, further))
 
     def _kinds(self, places: Places, like: LikeStations) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the places with own columns, and for each place the one that it shares."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import linalg
 
 from catenary.base.errors import RunBroken
-from catenary.solver.kernels import native
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
 
@@ -56,10 +56,14 @@ class OperatorBands:
         RunBroken
             If A is not positive definite there.
         """
-        bands = np.ascontiguousarray(self.between(first, last, further))
-        if not native.solve_bands(bands, right):
-            raise RunBroken("the step operator cannot be factored: it is not positive")
-        return right
+        bands = self.between(first, last, further)
+        try:
+            answers = linalg.solveh_banded(
+                bands, right.T, overwrite_b=True, lower=True, check_finite=False
+            )
+        except linalg.LinAlgError as error:
+            raise RunBroken("the step operator cannot be factored: it is not positive") from error
+        return np.asarray(answers.T)
 
     def _put_together(self, first: int, last: int) -> None:
         parts = list(iterate_entries(self._model, first, last, *self._coefficients))

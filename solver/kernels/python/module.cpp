@@ -3,7 +3,6 @@
 #include "base/compiler.hpp"
 #include "base/curves.hpp"
 #include "base/flush_to_zero.hpp"
-#include "line/bands.hpp"
 #include "line/condensing.hpp"
 #include "line/gusts.hpp"
 #include "line/short_columns.hpp"
@@ -59,7 +58,6 @@ void offer_line(py::module_& module) {
 
     offer(module, "condense_spans", condense_spans, "z 3, 3 n b>0, 3 n k, z k k");
     offer(module, "cut_out", cut_out, "");
-    offer(module, "solve_bands", solve_bands, "k>0 m, n m");
     offer(module, "bridge", bridge, "k, k, k, m+1, m k, m k");
     offer(module, "add_waves", add_waves, "s k, k m, s m");
 }

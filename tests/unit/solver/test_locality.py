@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from axial_lines import elastic_wires
 from measuring import COMM, line_alone, matrix_of
-from scipy import linalg
 from scipy.sparse import identity
 from scipy.sparse import linalg as sparse_linalg
 from small_lines import (
@@ -142,23 +141,6 @@ def test_short_columns_are_the_columns_of_full_solves(stepper: LineIntegrator) -
     print(f"largest difference {worst:.1e} of the peak; {stored:.0%} of the entries stored")
     assert worst < 1e3 * np.finfo(float).eps
     assert stored < 0.5
-
-
-@pytest.mark.parametrize("n", [1, 8, 13])
-def test_a_stretch_is_solved_for_many_forces_at_once(n: int) -> None:
-    bands = OperatorBands(line_model(2.75e-3, n_spans=6), (1.0, 0.25e-6, 0.5e-3))
-    right = np.random.default_rng(1).normal(size=(n, 120))
-    expected = linalg.solveh_banded(bands.between(40, 160), right.T, lower=True).T
-    # Some ten roundings a number; the matrix is nearly one of masses, a condition of some 100.
-    np.testing.assert_allclose(
-        bands.solve(40, 160, right), expected, rtol=0, atol=1e-13 * np.abs(expected).max()
-    )
-
-
-def test_an_operator_that_is_not_positive_is_refused() -> None:
-    bands = OperatorBands(line_model(0.0, n_spans=6), (1.0, -1.0, 0.0))
-    with pytest.raises(RunBroken, match="cannot be factored: it is not positive"):
-        bands.solve(40, 160, np.ones((1, 120)))
 
 
 def test_columns_that_leak_are_refused(stepper: LineIntegrator) -> None:
