@@ -37,7 +37,7 @@ WRONG: dict[str, tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], str]
         catenary.separations,
         (CASE,),
         {"step": np.inf},
-        "it is finite and above",
+        "it is finite and at least 0.001 m",
     ),
     "uncertainty, 3": (catenary.uncertainty, (3,), {}, "table is 3; it must be a table, or a file"),
     "sweep": (catenary.sweep, (CASE, SPEED, 3), {}, f"out is 3; {PATH}"),

@@ -83,7 +83,9 @@ class Distances(NamedTuple):
             )
         step = option("--step", "step")
         if not _CLOSEST <= self.step < inf:
-            raise InputError(f"{step} {self.step:g} is not possible: it is at least {_CLOSEST:g} m")
+            raise InputError(
+                f"{step} {self.step:g} is not possible: it is finite and at least {_CLOSEST:g} m"
+            )
         length = self.farthest - self.nearest
         if length / self.step > MOST:
             raise InputError(f"{step} {self.step:g} makes more than {MOST} distances")

@@ -82,8 +82,8 @@ REFUSALS: dict[str, tuple[Refused, list[str], str, str]] = {
     "speed, step": (
         lambda scene, done: catenary.highest_speeds(scene, step=1, within=2),
         ["speed", CASE, "--step", "1", "--within", "2"],
-        "within 2 step 1 is not possible: within is above 0 and at most step",
-        "--within 2 --step 1 is not possible: --within is above 0 and at most --step",
+        "within 2 step 1 is not possible: within is at least 0.001 km/h and at most step",
+        "--within 2 --step 1 is not possible: --within is at least 0.001 km/h and at most --step",
     ),
     "separation": (
         lambda scene, done: catenary.separations(scene, 90, 50),
