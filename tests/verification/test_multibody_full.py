@@ -92,23 +92,24 @@ def test_raised_below_a_still_wire_it_presses_with_its_static_force() -> None:
 def test_reduced_pantograph_follows_the_bodies_below_a_lively_wire() -> None:
     """A wire that moves by 20 mm at 1 Hz and 1 mm at 8 Hz: forces of 30 N and more around 150 N.
 
-    Reduced, the head is not carried along the track: 0.4 % of mass, 1 % of the forces' swing.
-    Touching from the start and raised slowly, so that nothing else swings: what swings freely
-    gets out of step, by half of that part of w t, and calms down with 0.5 1/s only.
+    Reduced, the arm carries the head's mass along the track: without it the forces differ by
+    0.07 N rms at 1 Hz. Touching from the start and raised slowly, so that little else swings: what
+    swings freely differs by 0.36 N rms in the third second and calms with 0.4 1/s, which leaves
+    0.033 N in the ninth.
     """
-    times = DT * np.arange(1, 5001)
+    times = DT * np.arange(1, 9001)
     wire = 0.02 * np.sin(2 * np.pi * times) + 1e-3 * np.sin(16 * np.pi * times)
     wire = HEIGHT - STATIC / WIRE + growing(times) * wire
     found = {}
     for name, pantograph in (("all bodies", full(raise_time=2.0)), ("reduced", reduced())):
         pantograph.place(HEIGHT - STATIC / WIRE)
         found[name] = run_below(pantograph, wire)
-    late = slice(3000, None)
+    late = slice(8000, None)
     force, other = (found[name][0][late] for name in ("all bodies", "reduced"))
     print(f"all bodies: {force.mean():.2f} N, sigma {force.std():.2f} N")
     assert force.std() > 20.0
     off = np.sqrt(np.mean((force - other) ** 2))
-    check("force, rms of the difference [N]", off, 0.0, within=0.01 * force.std())
+    check("force, rms of the difference [N]", off, 0.0, within=0.05)
 
 
 @pytest.mark.parametrize("method", METHODS)
