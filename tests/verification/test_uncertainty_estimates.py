@@ -57,7 +57,7 @@ def test_bounds_of_a_probability_cover_it(p: float, n: int) -> None:
 
 def test_bounds_of_a_probability_are_those_of_the_beta_distribution() -> None:
     """Clopper and Pearson in closed form: quantiles of the beta distribution."""
-    for k, n in ((0, 20), (3, 50), (50, 50)):
+    for k, n in ((0, 20), (3, 50), (50, 50), (1, 8192)):
         found = share(k, n)
         low = 0.0 if k == 0 else stats.beta.ppf(0.025, k, n - k + 1)
         high = 1.0 if k == n else stats.beta.ppf(0.975, k + 1, n - k)

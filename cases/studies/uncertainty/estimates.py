@@ -110,7 +110,9 @@ def share(hits: int, n: int) -> Bounded:
     """A probability from a number of hits among n, with bounds of Clopper and Pearson (1934)."""
     from scipy import stats
 
-    interval = stats.binomtest(hits, n).proportion_ci(CONFIDENCE, method="exact")
+    # The probability of the test, which is not asked for, underflows with thousands of runs.
+    with np.errstate(all="ignore"):
+        interval = stats.binomtest(hits, n).proportion_ci(CONFIDENCE, method="exact")
     return Bounded(hits / n, float(interval.low), float(interval.high))
 
 
