@@ -78,7 +78,7 @@ def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
 def _wire_moves_along_strips(scene: Scene) -> bool:
     """Whether it matters where wires cross the strips."""
     on = scene.switches()
-    kinds = [scene.pantographs[place.name] for place in scene.train.pantographs]
+    kinds = _kinds(scene).values()
     bends = on["flexible_strips"] and any(kind.strips.flexure is not None for kind in kinds)
     return bends or on["head_roll"] or on["lateral_motion"]
 
