@@ -16,28 +16,22 @@ from catenary.solver.tangents.set_up import Change
 # Numbers of matrices are kept to so many bits, far more than differences of set-ups know: rows of
 # equal elements are equal then.
 _BITS = 40
+# Pairs of rows that are taken at a time, so that their sums stay near the processor.
+_PAIRS_AT_A_TIME = 64
 _NO_NUMBERS = np.zeros(0, dtype=np.int64)
 
 
-class LaneSums(NamedTuple):
-    """Sums of the march's x, y and z with weights of the lanes; see
-    `kernels/tangents/tangent_lanes.hpp`, as for the next two."""
+class ChangedRows(NamedTuple):
+    """Changes of matrices by pairs of rows; see `kernels/tangents/tangent_lanes.hpp`."""
 
     weights: np.ndarray
-    begin: np.ndarray
-    unknowns: np.ndarray
-    numbers: np.ndarray
-
-
-class ChangedRows(NamedTuple):
-    """Changes of matrices by pairs of rows."""
-
-    sums: LaneSums
     kinds: np.ndarray
     begin: np.ndarray
     offsets: np.ndarray
     values: np.ndarray
     reach: int
+    room: int
+    sums: np.ndarray
 
 
 class TangentLanes(NamedTuple):
@@ -96,18 +90,15 @@ def lanes_of(
     sizes = [next(size for size in widths if size >= len(group)) for group in groups]
     assert line.passes is not None
     shares = line.passes.parts.arrays.motion.shares
-    rows = [_rows(group, size, n, shares) for group, size in zip(groups, sizes, strict=True)]
-    # Groups step one after the other, so that they share room that they fill anew.
-    sums = max((of.sums.numbers for of in rows), key=len, default=np.zeros(0))
     return [
         _lanes(
             line,
             own,
             size,
             any(change.loads_line for change in group),
-            of._replace(sums=of.sums._replace(numbers=sums)),
+            _rows(group, size, n, shares),
         )
-        for group, own, size, of in zip(groups, starts, sizes, rows, strict=True)
+        for group, own, size in zip(groups, starts, sizes, strict=True)
     ]
 
 
@@ -152,35 +143,38 @@ def _lanes(
 def _rows(changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray) -> ChangedRows:
     """Changes of matrices over all lanes, with a kind for pairs of rows that are equal.
 
-    The largest term of each lane is multiplied with sums at all n unknowns. Others, which have few
-    rows mostly, read their sums behind these. ``shares`` are those of the march's motion.
+    The largest matrix of each lane is multiplied with the first sums, its next with the second
+    ones. ``shares`` are those of the march's motion.
     """
     # Displacement, velocity and acceleration in terms of x, y and z.
     of_motion = np.array([shares[:3], [0.0, *shares[3:]], [0.0, 0.0, 1.0]])
-    terms = [sorted(change.matrices, key=lambda term: -term.values.size) for change in changes]
-    most = max(map(len, terms))
-    weights, unknowns = np.zeros((max(1, most), 3, n_lanes)), [_NO_NUMBERS]
-    rows, places, lanes, values = [_NO_NUMBERS], [_NO_NUMBERS], [_NO_NUMBERS], [np.zeros(0)]
-    for rank in range(most):
-        own = [(lane, of_lane[rank]) for lane, of_lane in enumerate(terms) if rank < len(of_lane)]
-        read, behind = np.arange(n), 0
-        if rank:
-            read = np.unique(np.concatenate([term.columns for _, term in own]))
-            behind = n + sum(map(len, unknowns))
-            unknowns.append(read)
-        for lane, term in own:
-            weights[rank, :, lane] = term.weights @ of_motion
-            rows.append(np.repeat(term.rows, np.diff(term.begin)))
-            places.append(behind + np.searchsorted(read, term.columns))
-            lanes.append(np.full(term.values.size, lane))
-            values.append(_rounded(term.values))
-    listed = np.concatenate(unknowns)
-    row, width = np.concatenate(rows), n + listed.size
-    entries, entry = np.unique(row // 2 * width + np.concatenate(places), return_inverse=True)
+    terms = [
+        (lane, place, term)
+        for lane, change in enumerate(changes)
+        for place, term in enumerate(sorted(change.matrices, key=lambda term: -term.values.size))
+    ]
+    n_terms = 1 + max((place for _, place, _ in terms), default=0)
+    weights = np.zeros((n_terms, 3, n_lanes))
+    rows, columns, lanes, places, values = ([_NO_NUMBERS] for _ in range(5))
+    for lane, place, term in terms:
+        weights[place, :, lane] = term.weights @ of_motion
+        rows.append(np.repeat(term.rows, np.diff(term.begin)))
+        columns.append(term.columns)
+        lanes.append(np.full(term.values.size, lane))
+        places.append(np.full(term.values.size, place))
+        values.append(_rounded(term.values))
+    row = np.concatenate(rows)
+    # Each entry of a pair of rows once for all lanes, by pairs.
+    number = (row // 2 * n_terms + np.concatenate(places)) * n + np.concatenate(columns)
+    entries, entry = np.unique(number, return_inverse=True)
     numbers = np.zeros((entries.size, 2, n_lanes))
     numbers[entry, row % 2, np.concatenate(lanes)] = np.concatenate(values)
-    pair, place = np.divmod(entries, width)
-    offsets = (place - 2 * pair).astype(np.int32)
+    part, column = np.divmod(entries, n)
+    pair, at = np.divmod(part, n_terms)
+    ahead = column - 2 * pair
+    reach = int(np.abs(ahead).max(initial=0))
+    room = 2 * (_PAIRS_AT_A_TIME + reach)
+    offsets = (at * room + ahead).astype(np.int32)
     ends = np.searchsorted(pair, np.arange((n + 1) // 2 + 1))
     counts = np.diff(ends)
     of_pairs = np.full((counts.size, counts.max()), -1.0)
@@ -189,17 +183,14 @@ def _rows(changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray) -
     first, kinds = kinds_of(of_pairs)
     which = np.isin(pair, first)
     return ChangedRows(
-        sums=LaneSums(
-            weights.reshape(-1, 3 * n_lanes),
-            np.cumsum([len(read) for read in unknowns], dtype=np.int64),
-            listed,
-            aligned_arrays.zeros(width * n_lanes, 4),
-        ),
-        kinds=kinds,
+        weights.reshape(-1, 3 * n_lanes),
+        kinds,
         begin=np.cumsum([0, *counts[first]], dtype=np.int64),
         offsets=offsets[which],
         values=aligned_arrays.copy(numbers[which]).reshape(-1, 2 * n_lanes),
-        reach=int(np.abs(offsets[place < n]).max(initial=0)),
+        reach=reach,
+        room=room,
+        sums=aligned_arrays.zeros(n_terms * room * n_lanes, 4),
     )
 
 

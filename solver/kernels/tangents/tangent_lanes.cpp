@@ -27,62 +27,59 @@ struct Wide<1> {
     static double at(const double* numbers) { return *numbers; }
 };
 
-/// Fill in the sums with the same weights, of n unknowns that `unknown` gives the numbers of.
-template <int64_t L, class Unknown>
-[[gnu::always_inline]] inline void add_up(const Motion& march, const double* weights, int64_t n,
-                                          Unknown unknown, double* sums) {
+/// Put the sums of the march's motion from unknown `begin` to `end` with the weights of a term.
+template <int64_t L>
+[[gnu::always_inline]] inline void add_up(const Motion& march, const double* weights, int64_t begin,
+                                          int64_t end, double* sums) {
     const typename Wide<L>::Numbers by_x = Wide<L>::at(weights), by_y = Wide<L>::at(weights + L),
                                     by_z = Wide<L>::at(weights + 2 * L);
     const double *x = march.x.data(), *y = march.y.data(), *z = march.z.data();
-    for (int64_t i = 0; i < n; ++i) {
-        const int64_t u = unknown(i);
-        Wide<L>::at(sums + L * i) = x[u] * by_x + y[u] * by_y + z[u] * by_z;
-    }
+    for (int64_t u = begin; u < end; ++u)
+        Wide<L>::at(sums + L * (u - begin)) = x[u] * by_x + y[u] * by_y + z[u] * by_z;
 }
 
-/// Put the loads of pairs of rows from `first` to `last`.
+/// Put the loads of pairs of rows from `first` to `last` by sums that begin with unknown `from`.
 template <int64_t L>
 [[gnu::always_inline]] inline void multiply(const ChangedRows& rows, int64_t first, int64_t last,
-                                            double* loads) {
+                                            int64_t from, double* loads) {
+    using Numbers = typename Wide<L>::Numbers;
     const int64_t* begin = rows.begin.data();
     const int32_t* offsets = rows.offsets.data();
-    const double *values = rows.values.data, *sums = rows.sums.numbers.data();
+    const double *values = rows.values.data, *sums = rows.sums.data();
     for (int64_t pair = first; pair < last; ++pair) {
-        const int64_t kind = rows.kinds[pair], end = begin[kind + 1];
-        typename Wide<L>::Numbers one{}, other{};
-        for (int64_t k = begin[kind]; k < end; ++k) {
-            const typename Wide<L>::Numbers sum = Wide<L>::at(sums + L * (2 * pair + offsets[k]));
-            one -= sum * Wide<L>::at(values + 2 * L * k);
-            other -= sum * Wide<L>::at(values + 2 * L * k + L);
+        const double* own = sums + L * (2 * pair - from);
+        // Two entries at a time, whose sums do not wait for each other.
+        Numbers one{}, other{}, next_one{}, next_other{};
+        const auto subtract = [&](int64_t k, Numbers& one, Numbers& other)
+                                  __attribute__((always_inline)) {
+                                      const Numbers sum = Wide<L>::at(own + L * offsets[k]);
+                                      one -= sum * Wide<L>::at(values + 2 * L * k);
+                                      other -= sum * Wide<L>::at(values + 2 * L * k + L);
+                                  };
+        int64_t k = begin[rows.kinds[pair]];
+        const int64_t end = begin[rows.kinds[pair] + 1];
+        for (; k + 1 < end; k += 2) {
+            subtract(k, one, other);
+            subtract(k + 1, next_one, next_other);
         }
-        Wide<L>::at(loads + 2 * L * pair) = one;
-        Wide<L>::at(loads + 2 * L * pair + L) = other;
+        if (k < end) subtract(k, one, other);
+        Wide<L>::at(loads + 2 * L * pair) = one + next_one;
+        Wide<L>::at(loads + 2 * L * pair + L) = other + next_other;
     }
 }
 
-/// Pairs of rows that are taken at a time, so that their sums are still near the processor.
-constexpr int64_t kPairsAtATime = 64;
-
-/// Put the loads of the pairs of rows from `low` to `high`.
+/// Put the loads of the pairs of rows from `low` to `high`, by as many as there is room for sums.
 template <int64_t L>
 [[gnu::always_inline]] inline void load(const ChangedRows& rows, const Motion& motion, int64_t low,
                                         int64_t high, double* loads) {
-    const auto& [weights, begin, unknowns, numbers] = rows.sums;
-    const int64_t n = size(motion.x);
-    for (int64_t i = 1; i < weights.rows; ++i)
-        add_up<L>(
-            motion, weights[i].data(), begin[i] - begin[i - 1],
-            [from = &unknowns[begin[i - 1]]](int64_t k) { return from[k]; },
-            numbers.data() + L * (n + begin[i - 1]));
-    int64_t ready = std::max<int64_t>(0, 2 * low - rows.reach);
-    for (int64_t first = low; first < high; first += kPairsAtATime) {
-        const int64_t last = std::min(first + kPairsAtATime, high);
-        const int64_t until = std::min(2 * last + rows.reach, n);
-        add_up<L>(
-            motion, weights[0].data(), until - ready, [ready](int64_t k) { return ready + k; },
-            numbers.data() + L * ready);
-        ready = until;
-        multiply<L>(rows, first, last, loads);
+    const int64_t at_a_time = rows.room / 2 - rows.reach, n = size(motion.x);
+    for (int64_t first = low; first < high; first += at_a_time) {
+        const int64_t last = std::min(first + at_a_time, high), from = 2 * first - rows.reach;
+        const int64_t begin = std::max<int64_t>(0, from), end = std::min(2 * last + rows.reach, n);
+        for (int64_t term = 0; term < rows.weights.rows; ++term)
+            add_up<L>(motion, rows.weights[term].data(), begin, end,
+                      rows.sums.data() + L * (rows.room * term + begin - from));
+        multiply<L>(rows, first, last, from, loads);
     }
 }
 /// Call a function with the number of lanes as a constant.

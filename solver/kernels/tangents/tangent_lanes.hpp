@@ -5,27 +5,23 @@
 
 namespace catenary {
 
-/// Sums of the march's x, y and z in L lanes, with weights of their own: (L,) for each of the
-/// three. Those with the first weights are at all unknowns; behind them
-/// stand those with weights[i] at the unknowns from begin[i - 1] to begin[i].
-struct LaneSums {
-    Array2<const double> weights;
-    std::span<const int64_t> begin, unknowns;
-    std::span<double> numbers;  ///< room for the sums
-    CATENARY_RECORD(weights, begin, unknowns, numbers)
-};
-
-/// Derivatives of the line's matrices by the parameters of L lanes, in pairs of rows: of all rows
-/// 2 p and 2 p + 1 the kind. Pairs of a kind have the same numbers, from begin[kind] to
-/// begin[kind + 1]; each is multiplied with the sums that stand `offset` behind number 2 p.
+/// Derivatives of the line's matrices by the parameters of L lanes, which are multiplied with sums
+/// of the march's x, y and z. A lane has up to n_terms matrices, each with sums by weights of its
+/// own.
+///
+/// Rows stand in pairs: of rows 2 p and 2 p + 1 the kind. Pairs of a kind have the same numbers,
+/// from begin[kind] to begin[kind + 1]; each is multiplied with the sums that stand `offset`
+/// unknowns behind unknown 2 p, where those of the next term stand `room` behind.
 struct ChangedRows {
-    LaneSums sums;
+    Array2<const double> weights;  ///< (n_terms, 3 L) of x, y and z
     std::span<const int32_t> kinds;
     std::span<const int64_t> begin;
     std::span<const int32_t> offsets;
     Array2<const double> values;  ///< (n, 2 L) of the one row in all lanes, then of the other
-    int64_t reach;                ///< how far from a pair the sums at all unknowns are read
-    CATENARY_RECORD(sums, kinds, begin, offsets, values, reach)
+    int64_t reach;                ///< how far from unknown 2 p sums are read
+    int64_t room;                 ///< for sums of a term near the pairs that are taken at a time
+    std::span<double> sums;       ///< (n_terms * room * L)
+    CATENARY_RECORD(weights, kinds, begin, offsets, values, reach, room, sums)
 };
 
 /// Motions of the line in L tangents: the numbers of an unknown in all of them follow each other.
