@@ -94,6 +94,11 @@ class Scene(Table):
         """
         return line_data(self.line, self._origin)
 
+    @cached_property
+    def _tables(self) -> dict[str, Any]:
+        """The scene as tables, made once: checks look values up by their keys."""
+        return self.model_dump()
+
     def refused(self, key: str, why: str, *, value: object = None) -> Fault:
         """The fault of a key: its value, where it was written, and why it cannot be.
 
@@ -125,7 +130,7 @@ class Scene(Table):
         """The value of a dotted key, which exists; of an effect whether it is on."""
         if key.startswith("effects."):
             return self.switches()[key.removeprefix("effects.")]
-        return value_at(self.model_dump(), key)
+        return value_at(self._tables, key)
 
     def fault(self, key: str, sentence: str) -> Fault:
         """The fault of a key; ``sentence`` continues after the key's name and place."""
