@@ -160,6 +160,30 @@ def test_forces_of_another_world_are_not_aligned(run: Path, table: pd.DataFrame)
     assert found.overlays[0].alignment is None
 
 
+@pytest.mark.parametrize(
+    ("factor", "kind", "words"),
+    [
+        (-1.0, "sign", "a force counts positive where it presses on the wire"),
+        (1e-3, "unit", "check the unit of its column, N or kN"),
+        (1e3, "unit", "check the unit of its column, N or kN"),
+        (-1e-3, "unit", "check the unit of its column, N or kN"),
+    ],
+)
+def test_forces_of_another_sign_or_unit_are_named(
+    run: Path, table: pd.DataFrame, factor: float, kind: str, words: str
+) -> None:
+    found = found_in(run, table.assign(force_N=factor * table.force_N))
+    assert [one.kind for one in found.findings] == [kind]
+    assert words in found.findings[0].text and not found.figures
+
+
+def test_a_lowered_pantograph_has_no_other_unit(run: Path, table: pd.DataFrame) -> None:
+    """Its sensor shows a noise of 2 N about zero, where the run has 120 N with 27 N about it."""
+    noise = 2.0 * np.random.default_rng(5).normal(size=len(table))
+    found = found_in(run, table.assign(force_N=noise))
+    assert [one.kind for one in found.findings] == ["missing pantograph"]
+
+
 def test_gaps_are_bridged_and_told(run: Path, table: pd.DataFrame) -> None:
     holed = table.copy()
     holed.iloc[300:310, 1] = np.nan
