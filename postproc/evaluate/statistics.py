@@ -91,7 +91,8 @@ class DropperStatistics:
     x : (n_droppers,) positions of all droppers [m]
     highest, lowest : (n_droppers,) largest and smallest force of each [N]
     evaluated : (n_droppers,) bool, whether the dropper hangs in the evaluation stretch
-    n_slackened : evaluated droppers whose force was zero at some time, 0 if none can slacken
+    n_slackened : evaluated droppers whose force was zero at some time and not always, as of one
+        that is missing; 0 if none can slacken
     maximum, minimum : largest and smallest force of the evaluated ones [N], NaN if there are none
     """
 
@@ -328,7 +329,9 @@ def _droppers(results: Results) -> DropperStatistics:
         highest,
         lowest,
         evaluated,
-        int(np.count_nonzero(lowest[evaluated] <= 0.0)) if slackens_at_all(results) else 0,
+        int(np.count_nonzero(evaluated & (lowest <= 0.0) & (highest > 0.0)))
+        if slackens_at_all(results)
+        else 0,
         _of(highest[evaluated], np.max),
         _of(lowest[evaluated], np.min),
     )

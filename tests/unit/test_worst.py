@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ from scenes import find_case, load_scene, mesh_of, problem_of
 from catenary.cases.studies.questions import worst_output
 from catenary.cases.studies.questions.causes import Causes, elasticity_along, gust_forces
 from catenary.cases.studies.questions.worst import Passage, stands_out, worst_places
-from catenary.postproc.evaluate.statistics import contact_statistics
+from catenary.postproc.evaluate.observations import observe
+from catenary.postproc.evaluate.statistics import contact_statistics, evaluate
 from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.read.results import Results
 from catenary.solver.statics.elasticity import elasticity
@@ -119,6 +121,21 @@ def test_figures_of_a_span_are_statistics_of_that_stretch(run_folder: Path) -> N
         x = results.line("arm_x")
         inside = (x >= 360) & (x <= 1080)
         assert places.arms[0].value == pytest.approx(1e3 * uplift[inside].max())
+
+
+def test_missing_droppers_do_not_slacken(run_folder: Path) -> None:
+    """Their force is zero throughout; others carry, are slack, and carry again."""
+    with Results(run_folder) as results:
+        force = results.channel("dropper_force")
+        found = evaluate(results)
+        droppers = found.droppers
+        missing = droppers.evaluated & ~force.any(axis=0)
+        assert missing.sum() == 3
+        slack = droppers.evaluated & (force <= 0.0).any(axis=0)
+        assert droppers.n_slackened == (slack & ~missing).sum() > 30
+        alone = replace(found, droppers=replace(droppers, evaluated=missing))
+        seen = observe(["dropper_slackenings"], results, alone)
+        assert seen["dropper_slackenings"].values == {"": 0.0}
 
 
 def test_places_that_no_pantograph_has_reached_are_left_out(
