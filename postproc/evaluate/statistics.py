@@ -91,8 +91,8 @@ class DropperStatistics:
     x : (n_droppers,) positions of all droppers [m]
     highest, lowest : (n_droppers,) largest and smallest force of each [N]
     evaluated : (n_droppers,) bool, whether the dropper hangs in the evaluation stretch
-    n_slackened : evaluated droppers whose force was zero at some time and not always, as of one
-        that is missing; 0 if none can slacken
+    slackened : (n_droppers,) bool, whether the force of each was zero at some time and not always,
+        as that of one that is missing; of none if they cannot slacken
     maximum, minimum : largest and smallest force of the evaluated ones [N], NaN if there are none
     """
 
@@ -100,9 +100,14 @@ class DropperStatistics:
     highest: np.ndarray
     lowest: np.ndarray
     evaluated: np.ndarray
-    n_slackened: int
+    slackened: np.ndarray
     maximum: float
     minimum: float
+
+    @property
+    def n_slackened(self) -> int:
+        """Number of evaluated droppers that slackened."""
+        return int(np.count_nonzero(self.evaluated & self.slackened))
 
 
 @dataclass(frozen=True)
@@ -329,9 +334,7 @@ def _droppers(results: Results) -> DropperStatistics:
         highest,
         lowest,
         evaluated,
-        int(np.count_nonzero(evaluated & (lowest <= 0.0) & (highest > 0.0)))
-        if slackens_at_all(results)
-        else 0,
+        (lowest <= 0.0) & (highest > 0.0) & slackens_at_all(results),
         _of(highest[evaluated], np.max),
         _of(lowest[evaluated], np.min),
     )

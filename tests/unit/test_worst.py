@@ -133,6 +133,7 @@ def test_missing_droppers_do_not_slacken(run_folder: Path) -> None:
         assert missing.sum() == 3
         slack = droppers.evaluated & (force <= 0.0).any(axis=0)
         assert droppers.n_slackened == (slack & ~missing).sum() > 30
+        assert not droppers.slackened[missing].any()
         alone = replace(found, droppers=replace(droppers, evaluated=missing))
         seen = observe(["dropper_slackenings"], results, alone)
         assert seen["dropper_slackenings"].values == {"": 0.0}
