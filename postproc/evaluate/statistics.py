@@ -229,7 +229,7 @@ def _of_force(
     edges, percent = histogram(filtered)
     maximum, minimum = float(filtered.max()), float(filtered.min())
     del filtered
-    lost = force[within] <= 0.0
+    lost = force <= 0.0
     return {
         "mean": mean,
         "std": std,
@@ -239,8 +239,9 @@ def _of_force(
         "minimum": minimum,
         "stat_max": mean + 3.0 * std,
         "stat_min": mean - 3.0 * std,
-        "loss_percent": 100.0 * float(lost.mean()),
-        "arcing_percent": 100.0 * float(without_short_losses(lost, dt).mean()),
+        "loss_percent": 100.0 * float(lost[within].mean()),
+        # A loss that an end of the stretch cuts is as long as it is.
+        "arcing_percent": 100.0 * float(without_short_losses(lost, dt)[within].mean()),
         "histogram_edges": edges,
         "histogram_percent": percent,
     }
