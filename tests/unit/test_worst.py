@@ -15,7 +15,7 @@ import pytest
 import verb_runner
 from scenes import find_case, load_scene, mesh_of, problem_of
 
-from catenary.cases.studies.questions import worst_output
+from catenary.cases.studies.questions import causes, worst_output
 from catenary.cases.studies.questions.causes import Causes, elasticity_along, gust_forces
 from catenary.cases.studies.questions.worst import Passage, stands_out, worst_places
 from catenary.postproc.evaluate.observations import observe
@@ -159,7 +159,9 @@ def test_places_that_no_pantograph_has_reached_are_left_out(
     assert min(one.value for one in places.arms) > 0.5 * min(whole.values())
 
 
-def test_a_span_at_whose_end_the_record_ends_within_a_step_is_whole(tmp_path: Path) -> None:
+def test_a_span_at_whose_end_the_record_ends_within_a_step_is_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """So are the statistics of such a stretch: 262 km/h are 7.3 cm a step, which miss the mast."""
     changes = ("train.speed_km_h=262", "train.end_m=480", "evaluation.to_m=480", "line.n_spans=10",
                "output.field_every_s=0")  # fmt: skip
@@ -169,6 +171,13 @@ def test_a_span_at_whose_end_the_record_ends_within_a_step_is_whole(tmp_path: Pa
         last = results.column("contact_position", 0)[-1]
         assert 480.0 - 0.073 < last < 480.0
         assert [one.span for one in sorted(worst_places(results).passages)] == [6, 7]
+        # Gusts are looked at until the mast is passed, or to the last record before it.
+        seen: list[list[tuple[float, ...]]] = []
+        monkeypatch.setattr(causes, "gust_forces", lambda rest, when: seen.append(when) or [])
+        rest: Any = object()
+        monkeypatch.setattr(causes, "elasticity_along", lambda *_: None)
+        Causes(results, worst_places(results).passages, rest)._gust_forces  # noqa: B018
+        assert max(when[3] for when in seen[0]) == results.time[-1]
 
 
 def test_what_stands_out_is_far_above_its_likes() -> None:
@@ -225,7 +234,10 @@ def test_the_pantograph_ahead_is_told_where_it_is_better() -> None:
     leading = Passage(2, 100.0, 150.0, 0, 20.0, 200.0, 50.0, 0.0, 20.0, False)
     worse, alike = (leading._replace(pantograph=1, std=std) for std in (26.0, 24.0))
     causes = Causes(line, [leading, worse], None)
-    assert "20.0 N" in "".join(causes._pantograph_ahead(worse))
+    assert "the pantograph ahead, which has 20.0 N" in "".join(causes._pantograph_ahead(worse))
+    third = worse._replace(pantograph=2)
+    several = "the pantographs ahead, of which the leading one has 20.0 N"
+    assert several in "".join(causes._pantograph_ahead(third))
     assert not list(causes._pantograph_ahead(alike)) and not list(causes._pantograph_ahead(leading))
 
 
