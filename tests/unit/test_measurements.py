@@ -27,6 +27,7 @@ from catenary.cases.studies.reference.validation import line_test
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.evaluate.span_differences import SpanSums, differences, span_sums
+from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.measurements import output
 from catenary.postproc.measurements.alignment import align, correlation_time
 from catenary.postproc.measurements.compared import Comparison
@@ -391,6 +392,16 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
 
 def invoke(*words: str) -> Any:
     return verb_runner.invoke("compare", *words)
+
+
+def test_part_of_a_span_is_no_sample_of_a_difference(run: Path, tmp_path: Path) -> None:
+    """Of the five evaluated spans the second record ends within the last."""
+    shutil.copy(run / "run.h5", tmp_path)
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        rows = int(np.searchsorted(file["channels/contact_position"][:, 0], 400.0))
+        file[COMPLETE][...] = [rows, 0, rows]
+    assert "differences by the spread" in compare(run, run)
+    assert "differences by the spread" not in compare(run, tmp_path)
 
 
 def test_a_validation_takes_a_comparison_as_its_line_test(
