@@ -403,7 +403,8 @@ class Run:
 
         ``force`` over time (n_times, n_droppers), as far as it is recorded; ``largest`` and
         ``smallest`` (n_droppers,) over every step; ``force_at_rest`` (n_droppers,); ``length``
-        (n_droppers,) unstretched, as cut [m]; ``slackened`` whether it was slack at some time.
+        (n_droppers,) unstretched, as cut [m]; ``slackened`` whether it was slack at some time
+        and carried at another.
         Beside them ``span`` (from 1), the wires ``hangs_from`` and ``carries``, and ``evaluated``,
         whether it hangs in the evaluated stretch.
 
@@ -416,13 +417,10 @@ class Run:
         """
         import xarray as xr
 
-        from catenary.postproc.evaluate.statistics import slackens_at_all
-
         results, found = self._results, self._evaluated.droppers
         dim = _COLUMNS[channels.DROPPER]
         names = np.array([*results.roles], dtype=str)
         upper, lower = results.dropper_wires().T
-        slack = (found.lowest <= 0.0) & slackens_at_all(results)
         recorded = {"force": self.channel("dropper_force")} if results.has("dropper_force") else {}
 
         def column(values: np.ndarray, long_name: str, **unit: str) -> tuple[str, np.ndarray, Any]:
@@ -433,7 +431,7 @@ class Run:
                 **recorded,
                 "largest": column(found.highest, "largest tension over every step", units="N"),
                 "smallest": column(found.lowest, "smallest tension over every step", units="N"),
-                "slackened": column(slack, "whether the dropper was slack at some time"),
+                "slackened": column(found.slackened, "whether the dropper was slack at some time"),
                 "force_at_rest": column(
                     results.static("dropper_force"), "tension at rest", units="N"
                 ),

@@ -213,7 +213,11 @@ def _span_sums(run: Results, number: int) -> SpanSums | None:
         force = filters.contact_force(run, number)
     except InputError:  # sampled too slowly; statistics say so
         return None
-    return span_sums(position, force, _evaluated_masts(run))
+    masts = _evaluated_masts(run)
+    # Spans that the record covers, to within a step as ``covers`` has it; parts are no samples.
+    step = float(np.diff(position).max())
+    whole = (masts >= position[0] - step) & (masts <= position[-1] + step)
+    return span_sums(position, force, masts[whole])
 
 
 def _evaluated_masts(run: Results) -> np.ndarray:

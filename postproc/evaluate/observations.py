@@ -298,7 +298,9 @@ def _dropper_slackenings(run: ObservedRun) -> Observation:
             was = np.zeros(columns.size, dtype=bool)
         begun[columns] += (slack & ~np.vstack([was, slack[:-1]])).sum(axis=0)
         was, until = slack[-1], (columns[0], part.stop)
-    return _one(float(begun[evaluated].max()))
+    # One that never carries, as it is missing or too long, does not slacken.
+    carries = run.statistics.droppers.highest > 0.0
+    return _one(float(begun[evaluated & carries].max(initial=0)))
 
 
 def _contact_wire_tension(run: ObservedRun) -> Observation:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from catenary.postproc.evaluate.error_indicators import Indicators
+from catenary.postproc.evaluate.filters import CUT_OFF
 from catenary.postproc.evaluate.lateral_places import lateral_ranges, sentence
 from catenary.postproc.evaluate.statistics import slackens_at_all
 from catenary.postproc.evaluate.wording import counted, stiffness_words
@@ -218,8 +219,9 @@ def _about_head(mass: float, stiffness: float, dt: float) -> list[str]:
     )
     result = []
     if frequency < _FELT_HZ:
+        where = "inside" if frequency < CUT_OFF else "near"
         result.append(
-            f"{begin}, inside the 20 Hz band: contact.stiffness_N_per_m is part of the "
+            f"{begin}, {where} the 20 Hz band: contact.stiffness_N_per_m is part of the "
             "result. Figures of other contact stiffnesses cannot be compared with these."
         )
     if omega * dt > _RESOLVED:

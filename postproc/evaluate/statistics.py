@@ -91,7 +91,8 @@ class DropperStatistics:
     x : (n_droppers,) positions of all droppers [m]
     highest, lowest : (n_droppers,) largest and smallest force of each [N]
     evaluated : (n_droppers,) bool, whether the dropper hangs in the evaluation stretch
-    n_slackened : evaluated droppers whose force was zero at some time, 0 if none can slacken
+    slackened : (n_droppers,) bool, whether the force of each was zero at some time and not always,
+        as that of one that is missing; of none if they cannot slacken
     maximum, minimum : largest and smallest force of the evaluated ones [N], NaN if there are none
     """
 
@@ -99,9 +100,14 @@ class DropperStatistics:
     highest: np.ndarray
     lowest: np.ndarray
     evaluated: np.ndarray
-    n_slackened: int
+    slackened: np.ndarray
     maximum: float
     minimum: float
+
+    @property
+    def n_slackened(self) -> int:
+        """Number of evaluated droppers that slackened."""
+        return int(np.count_nonzero(self.evaluated & self.slackened))
 
 
 @dataclass(frozen=True)
@@ -223,7 +229,7 @@ def _of_force(
     edges, percent = histogram(filtered)
     maximum, minimum = float(filtered.max()), float(filtered.min())
     del filtered
-    lost = force[within] <= 0.0
+    lost = force <= 0.0
     return {
         "mean": mean,
         "std": std,
@@ -233,8 +239,9 @@ def _of_force(
         "minimum": minimum,
         "stat_max": mean + 3.0 * std,
         "stat_min": mean - 3.0 * std,
-        "loss_percent": 100.0 * float(lost.mean()),
-        "arcing_percent": 100.0 * float(without_short_losses(lost, dt).mean()),
+        "loss_percent": 100.0 * float(lost[within].mean()),
+        # A loss that an end of the stretch cuts is as long as it is.
+        "arcing_percent": 100.0 * float(without_short_losses(lost, dt)[within].mean()),
         "histogram_edges": edges,
         "histogram_percent": percent,
     }
@@ -328,7 +335,7 @@ def _droppers(results: Results) -> DropperStatistics:
         highest,
         lowest,
         evaluated,
-        int(np.count_nonzero(lowest[evaluated] <= 0.0)) if slackens_at_all(results) else 0,
+        (lowest <= 0.0) & (highest > 0.0) & slackens_at_all(results),
         _of(highest[evaluated], np.max),
         _of(lowest[evaluated], np.min),
     )

@@ -18,8 +18,8 @@ class Finding:
 
     Attributes
     ----------
-    kind : "shift", "drift", "gain", "filter", "missing pantograph", "other pantograph", "unlike",
-        "height", "gaps" or "supports"
+    kind : "shift", "drift", "gain", "filter", "sign", "unit", "missing pantograph",
+        "other pantograph", "unlike", "height", "gaps" or "supports"
     pantograph : its name, empty if of none
     text : a sentence
     value : of what was found, in SI units, NaN without

@@ -29,6 +29,7 @@ from catenary.postproc.measurements.measurement_errors import (
     FORCE_SHARE,
     SHIFT,
     errors_of,
+    other_scale,
 )
 from catenary.postproc.measurements.passage import (
     MeasuredForce,
@@ -130,7 +131,11 @@ class _Comparing:
         force = self._without_gaps(own.force, name)
         if force is None:
             return
-        if np.median(force) < _NO_FORCE * float(np.mean(run.below(passage.cut_off)(run.position))):
+        expected = run.below(passage.cut_off)(run.position)
+        if other := other_scale(force, expected):
+            self._find(other[0], name, f"{name}: {other[1]}", float(np.mean(force)))
+            return
+        if np.median(force) < _NO_FORCE * float(np.mean(expected)):
             text = f"{name}: half of the measured forces are below {np.median(force):.1f} N: "
             self._find("missing pantograph", name, text + "lowered, or not recorded")
             return

@@ -15,6 +15,9 @@ from catenary.postproc.measurements.passage import Passage, RunForce
 SHIFT, DRIFTED, FORCE_SHARE, _FILTER_SHARE = 0.2, 0.1, 0.003, 0.03
 # A constant of so many stated deviations is no error.
 BIASES = 3.0
+# Means and deviations of a measured force and of the run's differ by less than the first factor;
+# by the others where one is in N and the other in kN.
+_ALIKE, _UNITS = 3.0, (1e-3, 1e3)
 
 
 def errors_of(
@@ -67,6 +70,35 @@ def errors_of(
         text = f"{name}: the values seem to have passed {seems}; the description states {stated}"
         value = np.inf if found.filter is None else found.filter
         yield Finding("filter", name, text, float(value))
+
+
+def other_scale(force: np.ndarray, expected: np.ndarray) -> tuple[str, str] | None:
+    """Kind of the error and a sentence, if a force has another sign or unit than that of the run.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n,)
+        Measured force [N].
+    expected : ndarray, shape (m,)
+        Force of the run in the same band [N].
+    """
+    mean, run = float(np.mean(force)), float(np.mean(expected))
+    spread = float(np.std(force)), float(np.std(expected))
+    if not (run > 0.0 and spread[1] > 0.0):
+        return None
+    ratios = np.array([abs(mean) / run, spread[0] / spread[1]])
+
+    def alike(factor: float) -> bool:
+        return bool(np.all((ratios > factor / _ALIKE) & (ratios < factor * _ALIKE)))
+
+    shown = float(f"{mean:.4g}")  # no power of ten up to a million
+    told = f"the measured force is {shown:g} N on average, and that of the run {run:.4g} N"
+    factor = next((one for one in _UNITS if alike(one)), None)
+    if factor is not None:
+        return "unit", f"{told}: check the unit of its column, N or kN"
+    if mean < 0.0 and alike(1.0):
+        return "sign", f"{told}: a force counts positive where it presses on the wire"
+    return None
 
 
 def _gain_words(found: Alignment) -> str:

@@ -21,7 +21,9 @@ from scenes import Scene, load_scene, resolved
 
 from catenary import InputError
 from catenary.cases.studies.accuracy.analysis import Row
+from catenary.cases.studies.accuracy.axes import AXES
 from catenary.cases.studies.accuracy.output import table_of
+from catenary.cases.studies.accuracy.runs import make_plan
 from catenary.cases.studies.effect_cost.output import write
 from catenary.cases.studies.effect_cost.study import (
     UNSWITCHED,
@@ -312,6 +314,24 @@ def test_measured_errors_of_the_same_step_and_mesh(tmp_path: Path) -> None:
     file.unlink()
     with pytest.raises(InputError, match="`catenary accuracy`, cannot be read: no such file"):
         measured_errors(scene_of(1e-3, 8), tmp_path)
+
+
+def test_errors_of_another_speed_or_stretch_are_refused(tmp_path: Path) -> None:
+    """Step and mesh of a study, and what is recorded and judged, may be others."""
+    plan = make_plan("ac_simple", [AXES["grid"]], ["train.speed_km_h=300", "numerics.dt_s=5e-4"])
+    file = study(tmp_path, "ac_simple") / "accuracy.json"
+    record = json.loads(file.read_text()) | {"scene": plan.scene}
+    file.write_text(json.dumps(record))
+    faster = ["train.speed_km_h=300", "output.flush_every_steps=10", 'evaluation.rules=["line"]']
+    assert measured_errors(load_scene("ac_simple", faster), tmp_path)["mean_force"] == 0.1
+    for changes, difference in (
+        ([], "train.speed_km_h = 300.0, the run is one with 275.0"),
+        ([*faster, "evaluation.to_m=990"], "evaluation.to_m = 1100.0, the run is one with 990.0"),
+        ([*faster, "effects.dropper_slackening=false"], "effects.dropper_slackening = true"),
+        ([*faster, "line.contact_wire.tension_N=21e3"], "line.contact_wire.tension_N = 22000.0"),
+    ):
+        with pytest.raises(InputError, match=f"is a study with {re.escape(difference)}"):
+            measured_errors(load_scene("ac_simple", changes), tmp_path)
 
 
 @pytest.mark.process

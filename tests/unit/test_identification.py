@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -232,6 +233,27 @@ def test_units_of_columns_are_converted() -> None:
     (signal,) = found.signals
     assert signal.values == pytest.approx(100.0 + np.sin(found.place))
     assert (signal.deviation, signal.bias) == (pytest.approx(5.0), pytest.approx(1.0))
+
+
+def test_raw_samples_that_are_stated_as_filtered_are_told() -> None:
+    """A wave of 30 Hz in raw samples, of which the filter leaves 0.8 %, and noise of 5 N."""
+    t = samples().t.to_numpy()
+    wave = 8.0 * np.sin(4.0 * np.pi * t), 10.0 * np.sin(80.0 * np.pi * t)
+    noise = 5.0 * np.random.default_rng(1).normal(size=t.size)
+    raw = samples().assign(F=100.0 + wave[0] + wave[1] + noise)
+    (told,) = measurement(raw).signals
+    # All of the wave, and the part of white noise at 250 Hz that is above 30 Hz.
+    expected = np.sqrt(50.0 + 25.0 * (1.0 - 30.0 / 125.0))
+    said = re.fullmatch(
+        r"The measured force varies by (\S+) N faster than 30 Hz, more than the filter of 20 Hz "
+        "leaves: if the values are raw, measured.is_filtered is false.",
+        told.hint,
+    )
+    # Of 800 samples the deviation is known to 2.5 %; a tenth is rounding and the filter's slope.
+    assert said and float(said[1]) == pytest.approx(expected, rel=0.1)
+    filtered = raw.assign(F=filters.low_pass(raw.F.to_numpy(), 0.004))
+    for quiet in (measurement(filtered), measurement(raw, is_filtered=False)):
+        assert [one.hint for one in quiet.signals] == [""]
 
 
 def test_raw_samples_and_the_march_pass_the_same_filter() -> None:

@@ -27,6 +27,7 @@ from catenary.cases.studies.reference.validation import line_test
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.evaluate.span_differences import SpanSums, differences, span_sums
+from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.measurements import output
 from catenary.postproc.measurements.alignment import align, correlation_time
 from catenary.postproc.measurements.compared import Comparison
@@ -158,6 +159,30 @@ def test_forces_of_another_world_are_not_aligned(run: Path, table: pd.DataFrame)
     found = found_in(run, table)
     assert [one.kind for one in found.findings] == ["unlike"]
     assert found.overlays[0].alignment is None
+
+
+@pytest.mark.parametrize(
+    ("factor", "kind", "words"),
+    [
+        (-1.0, "sign", "a force counts positive where it presses on the wire"),
+        (1e-3, "unit", "check the unit of its column, N or kN"),
+        (1e3, "unit", "check the unit of its column, N or kN"),
+        (-1e-3, "unit", "check the unit of its column, N or kN"),
+    ],
+)
+def test_forces_of_another_sign_or_unit_are_named(
+    run: Path, table: pd.DataFrame, factor: float, kind: str, words: str
+) -> None:
+    found = found_in(run, table.assign(force_N=factor * table.force_N))
+    assert [one.kind for one in found.findings] == [kind]
+    assert words in found.findings[0].text and not found.figures
+
+
+def test_a_lowered_pantograph_has_no_other_unit(run: Path, table: pd.DataFrame) -> None:
+    """Its sensor shows a noise of 2 N about zero, where the run has 120 N with 27 N about it."""
+    noise = 2.0 * np.random.default_rng(5).normal(size=len(table))
+    found = found_in(run, table.assign(force_N=noise))
+    assert [one.kind for one in found.findings] == ["missing pantograph"]
 
 
 def test_gaps_are_bridged_and_told(run: Path, table: pd.DataFrame) -> None:
@@ -367,6 +392,16 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
 
 def invoke(*words: str) -> Any:
     return verb_runner.invoke("compare", *words)
+
+
+def test_part_of_a_span_is_no_sample_of_a_difference(run: Path, tmp_path: Path) -> None:
+    """Of the five evaluated spans the second record ends within the last."""
+    shutil.copy(run / "run.h5", tmp_path)
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        rows = int(np.searchsorted(file["channels/contact_position"][:, 0], 400.0))
+        file[COMPLETE][...] = [rows, 0, rows]
+    assert "differences by the spread" in compare(run, run)
+    assert "differences by the spread" not in compare(run, tmp_path)
 
 
 def test_a_validation_takes_a_comparison_as_its_line_test(

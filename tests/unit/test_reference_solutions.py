@@ -157,6 +157,19 @@ def test_its_own_forces_are_within_the_bars(tmp_path: Path) -> None:
         assert rows["leading" if "leading" in found.forces else "trailing", HISTORY]["value"] < 2e-3
 
 
+def test_places_and_times_that_differ_are_told(tmp_path: Path) -> None:
+    """Times of the leading pantograph beside places at which each one passes: the trailing one is
+    200 m behind at these times."""
+    given = pd.read_csv(DATA / f"{TWO}.csv")
+    train = problem_of(read(TWO).configuration.scene()).train
+    given["time_s"] = (given[PLACE] - train.start) / train.speed
+    given.to_csv(tmp_path / "forces.csv", index=False)
+    (found,) = read_results([tmp_path / "forces.csv"], TWO, is_filtered=True)
+    (remark,) = found.remarks
+    assert "by which the trailing is up to 200 m elsewhere: place_m counts" in remark
+    assert found.figures["trailing", HISTORY] < 2e-3
+
+
 def test_a_planted_error_is_found(tmp_path: Path) -> None:
     given = pd.read_csv(DATA / f"{ONE}.csv")
     given["pantograph_N"] = 300.0 - given["pantograph_N"] + 9.0

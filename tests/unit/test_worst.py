@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import csv
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import verb_runner
 from scenes import find_case, load_scene, mesh_of, problem_of
 
-from catenary.cases.studies.questions import worst_output
+from catenary.cases.studies.questions import causes, worst_output
 from catenary.cases.studies.questions.causes import Causes, elasticity_along, gust_forces
 from catenary.cases.studies.questions.worst import Passage, stands_out, worst_places
-from catenary.postproc.evaluate.statistics import contact_statistics
+from catenary.postproc.evaluate.observations import observe
+from catenary.postproc.evaluate.statistics import contact_statistics, evaluate
+from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.read.results import Results
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
@@ -118,6 +123,63 @@ def test_figures_of_a_span_are_statistics_of_that_stretch(run_folder: Path) -> N
         assert places.arms[0].value == pytest.approx(1e3 * uplift[inside].max())
 
 
+def test_missing_droppers_do_not_slacken(run_folder: Path) -> None:
+    """Their force is zero throughout; others carry, are slack, and carry again."""
+    with Results(run_folder) as results:
+        force = results.channel("dropper_force")
+        found = evaluate(results)
+        droppers = found.droppers
+        missing = droppers.evaluated & ~force.any(axis=0)
+        assert missing.sum() == 3
+        slack = droppers.evaluated & (force <= 0.0).any(axis=0)
+        assert droppers.n_slackened == (slack & ~missing).sum() > 30
+        assert not droppers.slackened[missing].any()
+        alone = replace(found, droppers=replace(droppers, evaluated=missing))
+        seen = observe(["dropper_slackenings"], results, alone)
+        assert seen["dropper_slackenings"].values == {"": 0.0}
+
+
+def test_places_that_no_pantograph_has_reached_are_left_out(
+    run_folder: Path, tmp_path: Path
+) -> None:
+    """Their largest uplifts and forces are still to come, and would lower the medians."""
+    shutil.copy(run_folder / "run.h5", tmp_path)
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        rows = int(np.searchsorted(file["channels/contact_position"][:, 0], 800.0))
+        file[COMPLETE][...] = [rows, 0, rows]
+    with Results(tmp_path) as results:
+        places = worst_places(results)
+        text, _ = worst_output.answer_of(results, 3)
+    assert "The record ends with the last pantograph at 800 m: supports and" in text
+    # Spans of 60 m: the last mast before 800 m is at 780 m.
+    assert max(one.x for one in places.arms) == pytest.approx(780.0)
+    assert 780.0 < max(one.x for one in places.forces) <= 800.0
+    with Results(run_folder) as results:
+        whole = {one.x: one.value for one in worst_places(results).arms}
+    assert min(one.value for one in places.arms) > 0.5 * min(whole.values())
+
+
+def test_a_span_at_whose_end_the_record_ends_within_a_step_is_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So are the statistics of such a stretch: 262 km/h are 7.3 cm a step, which miss the mast."""
+    changes = ("train.speed_km_h=262", "train.end_m=480", "evaluation.to_m=480", "line.n_spans=10",
+               "output.field_every_s=0")  # fmt: skip
+    out = tmp_path / "out"
+    invoke("run", "en50318_2002", "-q", "-o", str(out), *(w for c in changes for w in ("--set", c)))
+    with Results(out) as results:
+        last = results.column("contact_position", 0)[-1]
+        assert 480.0 - 0.073 < last < 480.0
+        assert [one.span for one in sorted(worst_places(results).passages)] == [6, 7]
+        # Gusts are looked at until the mast is passed, or to the last record before it.
+        seen: list[list[tuple[float, ...]]] = []
+        monkeypatch.setattr(causes, "gust_forces", lambda rest, when: seen.append(when) or [])
+        rest: Any = object()
+        monkeypatch.setattr(causes, "elasticity_along", lambda *_: None)
+        Causes(results, worst_places(results).passages, rest)._gust_forces  # noqa: B018
+        assert max(when[3] for when in seen[0]) == results.time[-1]
+
+
 def test_what_stands_out_is_far_above_its_likes() -> None:
     likes = np.array([10.0, 10.1, 9.9, 10.0, 10.05, 12.0])
     assert stands_out(likes) == [False] * 5 + [True]
@@ -172,7 +234,10 @@ def test_the_pantograph_ahead_is_told_where_it_is_better() -> None:
     leading = Passage(2, 100.0, 150.0, 0, 20.0, 200.0, 50.0, 0.0, 20.0, False)
     worse, alike = (leading._replace(pantograph=1, std=std) for std in (26.0, 24.0))
     causes = Causes(line, [leading, worse], None)
-    assert "20.0 N" in "".join(causes._pantograph_ahead(worse))
+    assert "the pantograph ahead, which has 20.0 N" in "".join(causes._pantograph_ahead(worse))
+    third = worse._replace(pantograph=2)
+    several = "the pantographs ahead, of which the leading one has 20.0 N"
+    assert several in "".join(causes._pantograph_ahead(third))
     assert not list(causes._pantograph_ahead(alike)) and not list(causes._pantograph_ahead(leading))
 
 

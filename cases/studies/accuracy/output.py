@@ -306,6 +306,7 @@ def _record(found: Measured, target: float) -> dict[str, Any]:
         )
     return {
         "case": found.plan.case,
+        "scene": found.plan.scene,
         "target_percent": target,
         "advice": advices(found, target),
         "wall_s": found.wall,

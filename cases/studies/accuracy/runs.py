@@ -38,6 +38,8 @@ from catenary.postproc.read.validation import is_number
 # Nothing but channels is recorded, so that what is timed is the march.
 _ALWAYS = ("output.field_every_s=0", "output.energy_every_s=0")
 AS_IT_IS = Level("as_it_is", ())
+# Tables that say how finely a scene is computed and what is told of it.
+_HOW = ("case", "mesh", "numerics", "output")
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ class Plan:
     quick : whether levels are those of the short form
     overrides : assignments of the command line, for all runs
     asked : names of the requested axes, some of which may have nothing to vary
+    scene : what is computed, without its discretisation, see ``physics_of``
     """
 
     case: str
@@ -85,6 +88,7 @@ class Plan:
     quick: bool = False
     overrides: Sequence[str] = ()
     asked: Sequence[str] = ()
+    scene: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass
@@ -143,8 +147,20 @@ def make_plan(
             f"the axes {', '.join(axis.name for axis in axes)} have nothing to vary in "
             f"{scene.case.name}" + (", whose mesh is the user's own" if scene.mesh.file else "")
         )
-    asked = [axis.name for axis in axes]
-    return Plan(scene.case.name, planned, collected.jobs, repeats, quick, tuple(overrides), asked)
+    asked, physics = [axis.name for axis in axes], physics_of(scene)
+    return Plan(
+        scene.case.name, planned, collected.jobs, repeats, quick, tuple(overrides), asked, physics
+    )
+
+
+def physics_of(scene: Scene) -> dict[str, Any]:
+    """All keys of a scene that decide what is computed, not how finely or what is recorded and
+    judged, plain for JSON. Not collective."""
+    found: dict[str, Any] = plain(resolved(scene))
+    judged = found.pop("evaluation")
+    del found["train"]["end_m"]  # a run that is longer is the same up to there
+    stretch = {name: judged[name] for name in ("from_m", "to_m")}
+    return {"evaluation": stretch} | {name: own for name, own in found.items() if name not in _HOW}
 
 
 def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[PlannedAxis]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,11 +11,12 @@ import tomli_w
 
 from catenary.base.errors import InputError
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.faults import Origin
+from catenary.cases.scene.input.faults import Origin, shown
 from catenary.cases.scene.load import recorded_scene, scene_from
 from catenary.cases.scene.problem import problem_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.accuracy import output as accuracy
+from catenary.cases.studies.accuracy.runs import physics_of
 from catenary.cases.studies.effect_cost import output as effect_cost
 from catenary.cases.studies.records import read_study
 from catenary.postproc.read.results import Results
@@ -139,7 +141,7 @@ def measured_costs(scene: SceneOfRun, folder: Path) -> dict[str, str]:
 
 
 def _rows_of(path: Path, verb: str, scene: Scene) -> list[dict[str, Any]]:
-    """The rows of the record of a study of a scene's case."""
+    """The rows of the record of a study of a scene's case, and of no other scene if it has one."""
     record = read_study(path, verb)
     try:
         rows, case = list(record["rows"]), record["case"]
@@ -147,4 +149,17 @@ def _rows_of(path: Path, verb: str, scene: Scene) -> list[dict[str, Any]]:
         raise InputError(f"{path} is no record of `{verb}`: it has no rows of a case") from error
     if case != scene.case.name:
         raise InputError(f"{path} is a study of {case}, the run is one of {scene.case.name}")
+    if record.get("scene"):
+        for key, there, here in _differences(record["scene"], physics_of(scene)):
+            raise InputError(f"{path} is a study with {key} = {there}, the run is one with {here}")
     return rows
+
+
+def _differences(study: Any, run: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Keys in which two scenes differ, with both values in words."""
+    if isinstance(study, dict) and isinstance(run, dict):
+        for name in dict.fromkeys((*study, *run)):
+            own = f"{key}.{name}" if key else name
+            yield from _differences(study.get(name), run.get(name), own)
+    elif study != run:
+        yield key, shown(study), shown(run)

@@ -66,6 +66,9 @@ UNITS = {FORCE: "N", HEIGHT: "m"}
 _MOST_SAMPLES = 8000  # their covariance takes half a gigabyte
 # A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
 _SETTLED = 6.0
+# Of what is faster than so many cut-offs the filter leaves 0.8 %, of the noise's deviation 0.2 %;
+# values with more than these parts, of their deviation and of the noise's, have not passed it.
+_FAST, _OF_VALUES, _OF_NOISE = 1.5, 0.01, 0.1
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,7 @@ class Signal:
     deviation : standard deviation of their noise
     bias : standard deviation of an unknown constant in them, zero if there is none
     unit, factor : unit of the file, in which the constant is told, and its factor to N or m
+    hint : sentence if the values should have passed a filter and do not look so, else empty
     """
 
     name: str
@@ -89,6 +93,7 @@ class Signal:
     bias: float
     unit: str
     factor: float
+    hint: str = ""
 
 
 class Measurement:
@@ -127,7 +132,7 @@ class Measurement:
         self.pantograph = task.pantograph - 1
         self._cut_off, self._is_filtered = task.filter_Hz, task.is_filtered
         places = places_of(table, path, task, speed, start)
-        dt = float(places[-1] - places[0]) / ((len(places) - 1) * speed)
+        self._spacing = dt = float(places[-1] - places[0]) / ((len(places) - 1) * speed)
         self._dt = None if task.is_filtered else dt
         begin = stretch[0] if task.from_m is None else task.from_m
         end = stretch[1] if task.to_m is None else task.to_m
@@ -164,15 +169,34 @@ class Measurement:
     def _signal(
         self, table: pd.DataFrame, path: str, name: str, column: Force | Height, lags: np.ndarray
     ) -> Signal:
-        values = column_of(table, path, column.column)[self._rows] * column.factor
-        values = self._sampled(values)
+        own = column_of(table, path, column.column)[self._rows] * column.factor
+        values = self._sampled(own)
         assert column.noise is not None  # the task was checked
         deviation = column.noise * column.factor
         if self._dt is not None:
             deviation *= np.sqrt(filters.kept_variance(self._cut_off, self._dt))
         whitening = Whitening(lags, deviation, self._cut_off, self._dt)
         bias = column.bias * column.factor
-        return Signal(name, values, whitening, deviation, bias, column.unit, column.factor)
+        hint = self._hint(name, own, deviation) if self._is_filtered else ""
+        return Signal(name, values, whitening, deviation, bias, column.unit, column.factor, hint)
+
+    def _hint(self, name: str, values: np.ndarray, noise: float) -> str:
+        """Sentence on values (n,) of the file that vary faster than a filter leaves, with ``noise``
+        as their stated deviation; empty if they do not, or are too coarse to show it."""
+        fast = _FAST * self._cut_off
+        if 2.0 * fast * self._spacing >= 1.0:
+            return ""
+        rest = values - filters.low_pass(values, self._spacing, fast)
+        margin = int(np.ceil(_SETTLED / (fast * self._spacing)))
+        inside = rest[margin : rest.size - margin]
+        deviation = float(np.std(inside if inside.size else rest))
+        if deviation < max(_OF_VALUES * float(np.std(values)), _OF_NOISE * noise):
+            return ""
+        return (
+            f"The measured {name} varies by {deviation:.2g} {UNITS[name]} faster than {fast:g} Hz, "
+            f"more than the filter of {self._cut_off:g} Hz leaves: if the values are raw, "
+            "measured.is_filtered is false."
+        )
 
     def _sampled(self, values: np.ndarray) -> np.ndarray:
         """Filter values (n, ...) at the file's places, and keep the values that are compared."""

@@ -97,6 +97,7 @@ def as_text(found: Identification) -> str:
     lines += _correlated(found)
     lines += ["", *(_sentence(name, one) for name, one in found.judged.items())]
     lines.append(verdict(found))
+    lines += _hints(found)
     sums = ", ".join(f"{one:.1f}" for one in found.sums)
     if len(found.sums) > 1:
         lines.append(
@@ -109,6 +110,11 @@ def as_text(found: Identification) -> str:
     if not found.has_converged:
         lines.append(f"The search has not converged after {found.n_marches} marches.")
     return "\n".join(lines)
+
+
+def _hints(found: Identification) -> list[str]:
+    """Sentences on signals that are not as the task states them."""
+    return [one.hint for one in found.signals if one.hint]
 
 
 def _unknown_directions(found: Identification) -> list[str]:
@@ -213,6 +219,7 @@ def summary_of(found: Identification) -> dict[str, Any]:
             for name, one in found.judged.items()
         },
         "verdict": verdict(found),
+        "hints": _hints(found),
         "converged": found.has_converged,
         "n_marches": found.n_marches,
         "n_jacobians": found.n_jacobians,

@@ -204,10 +204,11 @@ class Causes:
             (o for o in self._passages if o.span == passage.span and o.pantograph == 0), None
         )
         if passage.pantograph and leading is not None and passage.std > 1.25 * leading.std:
-            yield (
-                f"it runs in the waves of the pantograph ahead, which has {leading.std:.1f} N in "
-                "the same span"
-            )
+            ahead = (
+                "pantograph ahead, which" if passage.pantograph == 1
+                else "pantographs ahead, of which the leading one"
+            )  # fmt: skip
+            yield f"it runs in the waves of the {ahead} has {leading.std:.1f} N in the same span"
 
     def _length(self, span: int) -> Iterator[str]:
         lengths = np.diff(self._masts)
@@ -314,7 +315,9 @@ class Causes:
         numbers = {one.pantograph for one in self._passages}
         positions = {p: self._results.column("contact_position", p) for p in numbers}
         for one in self._passages:
-            rows = np.searchsorted(positions[one.pantograph], (one.start, one.end)).tolist()
+            own = positions[one.pantograph]
+            # A record may end within a step before the mast.
+            rows = np.minimum(np.searchsorted(own, (one.start, one.end)), own.size - 1).tolist()
             come, gone = map(self._results.time_at, rows)
             when.append((one.start, one.end, come - _BEFORE, gone))
         found: dict[int, dict[int, float]] = {}

@@ -83,6 +83,8 @@ class WorstPlaces(NamedTuple):
     forces : droppers by largest force
     slack : droppers by time slack, those that are
     least : (n_droppers,) smallest force of every dropper of the line [N]
+    passed_to : place that all pantographs have reached [m]; arms and droppers beyond are left out,
+        as their largest values are still to come
     """
 
     passages: list[Passage]
@@ -90,6 +92,7 @@ class WorstPlaces(NamedTuple):
     forces: list[Spot]
     slack: list[Spot]
     least: np.ndarray
+    passed_to: float
 
 
 def worst_places(results: Results) -> WorstPlaces:
@@ -108,16 +111,31 @@ def worst_places(results: Results) -> WorstPlaces:
     of_droppers = _of_several([names[wire] for wire in results.dropper_wires()[:, 1].tolist()])
     likes = dropper_likes(results)
     times = slack_times(results)
+    passed_to = _passed_to(results)
+    arms, hung = (one.evaluated & (one.x <= passed_to) for one in (supports, droppers))
     # One that never carries is missing or loose, and not slack at times.
-    carries = droppers.evaluated & (droppers.highest > 0.0)
-    slack = _spots(droppers.x, times, carries, likes, of_droppers)
+    slack = _spots(droppers.x, times, hung & (droppers.highest > 0.0), likes, of_droppers)
     return WorstPlaces(
         sorted(_passages(results), key=lambda one: -one.std),
-        _spots(supports.x, 1e3 * supports.uplift, supports.evaluated, everywhere, of_arms),
-        _spots(droppers.x, droppers.highest, droppers.evaluated, likes, of_droppers),
+        _spots(supports.x, 1e3 * supports.uplift, arms, everywhere, of_arms),
+        _spots(droppers.x, droppers.highest, hung, likes, of_droppers),
         [one for one in slack if one.value > 0.0],
         droppers.lowest,
+        passed_to,
     )
+
+
+def _passed_to(results: Results) -> float:
+    """Place that all pantographs have reached, to within a step as ``covers`` has it [m]; infinite
+    without a train."""
+    if results.attributes.get("excitation"):
+        return np.inf
+    n = results.n_rows("time")
+    step = results.fact("speed") * results.dt
+    last = (
+        results.column("contact_position", p, slice(n - 1, n)) for p in range(results.n_pantographs)
+    )
+    return min((float(one[0]) for one in last), default=-np.inf) + step if n else -np.inf
 
 
 def _of_several(wires: Sequence[str]) -> list[str]:
@@ -140,7 +158,7 @@ def _passages(results: Results) -> list[Passage]:
         own = []
         for span in spans_in_stretch(results):
             start, end = float(masts[span]), float(masts[span + 1])
-            if not position.size or position[0] > start or position[-1] < end:
+            if not stats.covers(position, (start, end)):
                 continue
             within = (position >= start) & (position <= end)
             part = filtered[within]

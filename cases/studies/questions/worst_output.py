@@ -35,6 +35,11 @@ def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:
     ]
     if not places.passages:
         lines.append("No span lies whole within the evaluated stretch and the record.")
+    if places.passed_to < end:
+        lines.append(
+            f"The record ends with the last pantograph at {places.passed_to:.0f} m: supports and "
+            "droppers beyond are left out."
+        )
     for (noun, by), found in worst_of_each(places, causes, names, count).items():
         lines += ["", f"{noun.capitalize()}s by {by}"]
         for sentence, candidates in found:

@@ -159,7 +159,7 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
             f"of {solution.configuration.name} [N]: it has {columns_in(table)}"
         )
     for of in there:
-        place, dt = _places_of(solution, of, table, name)
+        place, dt = _places_of(one, of, table, name)
         force = column_of(table, name, f"{of}_N")
         start, end = solution.stretch
         if place[0] > start + 1e-6 or place[-1] < end - 1e-6:
@@ -188,19 +188,25 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
         _add(one, of, HISTORY, rms(one.forces[of] - solution.forces[of]), name)
 
 
-def _places_of(
-    solution: Solution, of: str, table: pd.DataFrame, name: str
-) -> tuple[np.ndarray, float]:
-    """Places of the samples [m], and the time between two [s]."""
+def _places_of(one: Others, of: str, table: pd.DataFrame, name: str) -> tuple[np.ndarray, float]:
+    """Places of the samples [m], and the time between two [s]; of places and times places count,
+    and a remark tells if they differ."""
+    solution = one.solution
     train = problem_of(solution.configuration.scene()).train
-    if PLACE in table:
-        place = column_of(table, name, PLACE)
-    else:
-        number = list(solution.forces).index(of)
-        start = train.start - train.placements[number].behind
-        place = start + train.speed * column_of(table, name, TIME)
-    place = evened_out(place, name)
+    number = list(solution.forces).index(of)
+    start = train.start - train.placements[number].behind
+    by_time = start + train.speed * column_of(table, name, TIME) if TIME in table else None
+    stated = (
+        by_time if by_time is not None and PLACE not in table else column_of(table, name, PLACE)
+    )
+    place = evened_out(stated, name)
     spacing = place[1] - place[0]
+    off = 0.0 if by_time is None else float(np.abs(by_time - stated).max())
+    if off > spacing:
+        one.remarks.append(
+            f"{name} has {PLACE} and {TIME}, by which the {of} is up to {off:.4g} m elsewhere: "
+            f"{PLACE} counts."
+        )
     dt = spacing / train.speed
     if 2.0 * filters.CUT_OFF * dt >= 1.0:
         raise InputError(

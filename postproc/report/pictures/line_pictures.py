@@ -158,7 +158,7 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
 
     mark_line(along, results, *with_margin(x))
     draw_ranges(along, x, droppers.lowest, droppers.highest)
-    slack = droppers.lowest <= 0.0
+    slack = droppers.slackened
     along.plot(x[slack], droppers.lowest[slack], "v", color=LIMIT, ms=4, label="slackened")
     along.axhline(0.0, color=GREY, linewidth=0.8)
     tidy(along, "position along the track [m]", "dropper force [N]", "All droppers")

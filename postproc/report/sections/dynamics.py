@@ -139,9 +139,9 @@ def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
     names = [wire_words(name) for name in results.roles]
     carried = [names[wire] for wire in results.dropper_wires()[:, 1].tolist()]
     several = len(set(carried)) > 1
-    # The least force of all that slacken is zero.
-    slackened = bool(np.any(slack[droppers.evaluated] > 0.0))
-    longest = np.where(slack > 0.0, slack, np.nan)
+    # The least force of all that slacken is zero; one that never carries is missing or too long.
+    longest = np.where((slack > 0.0) & (droppers.highest > 0.0), slack, np.nan)
+    slackened = bool(np.isfinite(longest[droppers.evaluated]).any())
     least = {"longest slack": longest} if slackened else {"least force": -droppers.lowest}
     kinds = {"largest force": droppers.highest, **least}
     allowed = run.limit("dropper_force_max")
@@ -156,7 +156,8 @@ def _tables(run: EvaluatedRun) -> Iterator[StudyTable]:
         heads = ["position [m]", *(["carries"] if several else ())]
         right = {0, *range(len(heads), len(heads) + 4)}
         heads += ["at rest [N]", "largest [N]", "least [N]", "slack [s]", "among the extremes"]
-        note = "Forces over the whole run; slack is the time without force. "
+        recorded = "" if results.line_record.whole else ", as far as it is recorded"
+        note = f"Forces over the whole run; slack is the time without force{recorded}. "
         note += _note(len(rows), int(droppers.evaluated.sum()), "droppers.csv")
         yield texts_table(heads, rows, right, "Evaluated droppers", note)
 

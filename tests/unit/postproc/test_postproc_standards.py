@@ -129,7 +129,7 @@ LIMITS = [
     ("tsi_ene:2023", "wire_height_min", "ac", 250.0, 5080.0),
     ("tsi_ene:2023", "wire_height_min", "ac", 200.0, 5000.0),
     ("tsi_ene:2023", "wire_height_max", "ac", 250.0, 5300.0),
-    ("tsi_ene:2023", "wire_height_max", "ac", 200.0, 6500.0),
+    ("tsi_ene:2023", "wire_height_max", "ac", 200.0, 6200.0),
     ("tsi_ene:2023", "wire_lateral_place", "ac", 300.0, 250.0),
     ("tsi_ene:2023", "working_width", "ac", 300.0, 400.0),
     ("tsi_loc_pas:2023", "mean_force", "dc_3kv", 200.0, 148.8),

@@ -76,7 +76,18 @@ def test_loss_counts_all_intervals_and_arcing_only_those_of_5_ms() -> None:
     assert found.arcing_percent == pytest.approx(100 * 16 / 4000)
 
 
-def test_losses_at_both_ends_of_the_stretch_are_intervals_too() -> None:
+def test_a_loss_across_an_end_of_the_stretch_counts_by_its_whole_length() -> None:
+    force = np.full(TIME.size, 150.0)
+    first = int(np.flatnonzero(WITHIN)[0])
+    force[first - 4 : first + 2] = 0.0  # 6 ms, of which 2 ms are in the stretch
+    found = of_force(force)
+    assert found.loss_percent == found.arcing_percent == pytest.approx(100 * 2 / 4000)
+    force[first - 4] = force[first - 3] = 150.0  # 4 ms
+    found = of_force(force)
+    assert (found.loss_percent, found.arcing_percent) == pytest.approx((100 * 2 / 4000, 0.0))
+
+
+def test_losses_at_both_ends_of_a_record_are_intervals_too() -> None:
     lost = np.zeros(50, dtype=bool)
     lost[:6] = lost[-2:] = True
     kept = stats.without_short_losses(lost, DT)
