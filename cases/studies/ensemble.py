@@ -34,7 +34,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.record.run_watch import RunWatch
 from catenary.postproc.report.summary import short_summary
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
-from catenary.solver.ensemble.shared_line import N_LANES, SharedLine, why_alone
+from catenary.solver.ensemble.shared_line import SharedLine, why_alone
 from catenary.solver.kernels import native
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
@@ -175,7 +175,8 @@ class Marches:
             return
         left = dict.fromkeys(problems)
         if line.shared is not None:
-            for ended in _by_lots(march_side_by_side(line.shared, line.fitting(problems))):
+            marched = march_side_by_side(line.shared, line.fitting(problems))
+            for ended in _by_lots(marched, len(line.shared.lanes)):
                 # A march by itself says why a train has no place, and why a step has no forces.
                 if not isinstance(ended, SceneHistory) or ended.is_left or _is_unusual(ended):
                     continue
@@ -317,10 +318,10 @@ class _Line:
         }
 
 
-def _by_lots(items: Iterator[T]) -> Iterator[T]:
-    """Items as they come, so many as there are lanes at once: in between a march takes the caches
+def _by_lots(items: Iterator[T], size: int) -> Iterator[T]:
+    """Items as they come, so many at once: in between a march takes the caches
     of the processor from what evaluates them."""
-    while lot := list(islice(items, N_LANES)):
+    while lot := list(islice(items, size)):
         yield from lot
 
 

@@ -17,7 +17,7 @@ from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.contact_problem.coupling import Implicit, make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.ensemble.shared_line import N_LANES, Lane, SharedLine
+from catenary.solver.ensemble.shared_line import Lane, SharedLine
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
@@ -91,7 +91,7 @@ def march_side_by_side(
         shared line.
     """
     left = iter(scenes)
-    marches: list[_OnItsWay | None] = [None] * N_LANES
+    marches: list[_OnItsWay | None] = [None] * len(shared.lanes)
     while True:
         for lane in shared.lanes:
             while marches[lane.number] is None:

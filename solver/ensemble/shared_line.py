@@ -113,9 +113,6 @@ def _displaced(
     )
 
 
-N_LANES: int = native.SCENES
-
-
 class LineExtremes(NamedTuple):
     """Extremes of uplift and dropper force in each lane; see ``kernels/ensemble/scene_passes.hpp``.
 
@@ -123,9 +120,9 @@ class LineExtremes(NamedTuple):
     ----------
     arms : (n_arms,) unknowns of vertical displacement at steady arms
     droppers : LinkArrays
-    rest : (n_droppers, N_LANES) their reserves at rest [N]
-    uplift : (n_arms, N_LANES) largest displacement [m]
-    least, largest : (n_droppers, N_LANES) forces of droppers [N]
+    rest : (n_droppers, n_lanes) their reserves at rest [N]
+    uplift : (n_arms, n_lanes) largest displacement [m]
+    least, largest : (n_droppers, n_lanes) forces of droppers [N]
     """
 
     arms: np.ndarray
@@ -185,25 +182,26 @@ class SharedLine:
             passes is not None
             and not model.loads
             and not model.droppers_bend  # extremes of forces know one slope
-            and all(map(native.are_compiled_for_scenes, passes.rows, passes.columns))
+            and bool(passes.scenes_at_once)
         )
         if passes is None or not self.steps_together:
             return
         self._wires = ContactWires(model, form, self.ownership)
-        lanes = range(N_LANES)
+        n_lanes = passes.scenes_at_once[-1]
+        lanes = range(n_lanes)
         links = [FollowedLinks(self._table, self.line) for _ in lanes]
         self.columns = ForceColumns(
             self.comm, model, self._wires, self.line, links[0], range_of_run
         )
-        arrays = passes.arrays_in_lanes(N_LANES)
+        arrays = passes.arrays_in_lanes(n_lanes)
         motions = [LineState.of(arrays.motion.at(k), self.line.motion.gains) for k in lanes]
         self.lanes = [Lane(*own) for own in zip(lanes, motions, links, strict=True)]
         _, droppers, _ = links[0].shown(DROPPERS)
         n, arms = droppers.law.size, model.dofs(model.mesh.steady_arms).astype(np.int64)
-        self._rest = np.zeros((links[0].numbers.size, N_LANES))
-        forces = np.zeros((3, n, N_LANES))
-        self.extremes = LineExtremes(arms, droppers, forces[0], np.zeros((arms.size, N_LANES)),
-                                     *forces[1:])  # fmt: skip
+        self._rest = np.zeros((links[0].numbers.size, n_lanes))
+        rest, *forces = np.zeros((3, n, n_lanes))
+        uplift = np.zeros((arms.size, n_lanes))
+        self.extremes = LineExtremes(arms, droppers, rest, uplift, *forces)
         followed = passes.tracked(links[0].links, links[0].reserve)
         parts = passes.parts._replace(arrays=arrays)
         self._passes = native.ScenePasses(passes.rows, passes.columns, parts)
@@ -233,7 +231,7 @@ class SharedLine:
             extremes.rest[:, number] = links.shown(DROPPERS)[1].law["rest"]
         read = lane.motion.read
         # Without velocity and acceleration displacements are a share of x.
-        read.x[::N_LANES] = taut.moved / read.shares[0]
+        read.x[:: len(self.lanes)] = taut.moved / read.shares[0]
         extremes.uplift[:, number] = taut.moved[extremes.arms]
         force = at_rest.form.dropper_force
         extremes.least[:, number] = extremes.largest[:, number] = force

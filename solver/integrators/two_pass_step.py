@@ -165,6 +165,11 @@ class StationPasses:
         native.left_behind(self._starts, self._stretch, links.unknowns, ranges)
         return TrackedLinks(links, reserve, ranges, self._stretch)
 
+    @property
+    def scenes_at_once(self) -> list[int]:
+        """Numbers of scenes, ascending, that kernels step side by side on this line."""
+        return native.scenes_at_once(self.rows, self.columns)
+
     def arrays_in_lanes(self, n_lanes: int, is_loaded: bool = False) -> PassArrays:
         """Arrays of ``n_lanes`` motions at rest; values of an unknown in all lanes are contiguous.
 

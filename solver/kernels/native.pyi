@@ -200,8 +200,9 @@ def are_compiled(rows: Layout, factors: Layout) -> bool:
     """Whether kernels were compiled for stations of such rows and factors; general kernels step
     others, with masks found at run time."""
 
-def are_compiled_for_scenes(rows: Layout, factors: Layout, scenes: int = ...) -> bool:
-    """Whether this processor has kernels that step so many scenes side by side."""
+def scenes_at_once(rows: Sequence[Layout], factors: Sequence[Layout]) -> list[int]:
+    """Numbers of scenes, ascending, that kernels of this processor step side by side on a line with
+    stations of such rows and factors."""
 
 class Products:
     """Products with rows of K, and C, of stations of each type."""
@@ -281,29 +282,26 @@ class Steps(BlockSteps):
     def write(self, path: str, ahead: object) -> None:
         """Write a file with the parts of the steps, and the inputs ``Ahead``."""
 
-SCENES: int
-MOST_SCENES: int
-
 class SceneSteps:
-    """Free steps of a line in ``SCENES`` scenes side by side."""
+    """Free steps of a line in several scenes side by side."""
 
     def step(self) -> None:
         """Take a step in all scenes."""
 
 class ScenePasses(SceneSteps):
-    """``TwoPasses`` in ``SCENES`` scenes, with arrays of all scenes in ``parts``."""
+    """``TwoPasses`` in several scenes, with arrays of all scenes in ``parts``."""
 
     def __init__(
         self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object
     ) -> None: ...
     def track(self, links: object, rest: np.ndarray, reserves: Sequence[np.ndarray]) -> None:
-        """Fill ``reserves`` (n,) of links in each lane; at rest ``rest`` (n, SCENES) [N]."""
+        """Fill ``reserves`` (n,) of links in each lane; at rest ``rest`` (n, n_lanes) [N]."""
 
     def rest(self, lane: int) -> None:
         """Put the line of a lane at rest."""
 
 class Ensemble:
-    """Marches of ``SCENES`` scenes side by side, each in a lane of vectors.
+    """Marches of several scenes side by side, each in a lane of vectors.
 
     Parameters
     ----------

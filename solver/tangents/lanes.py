@@ -104,16 +104,8 @@ def lanes_of(
 
 def _sizes(line: LineIntegrator) -> list[int]:
     """Numbers of motions that kernels step at once, ascending."""
-    passes = line.passes
-    assert passes is not None
-    return [1] + [
-        size
-        for size in (native.SCENES, native.MOST_SCENES)
-        if all(
-            native.are_compiled_for_scenes(rows, factors, size)
-            for rows, factors in zip(passes.rows, passes.columns, strict=True)
-        )
-    ]
+    assert line.passes is not None
+    return [1, *line.passes.scenes_at_once]
 
 
 def _lanes(

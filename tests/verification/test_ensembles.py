@@ -19,7 +19,6 @@ from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.studies import ensemble as scenes_on_lines
 from catenary.cases.studies.ensemble import Marched, Marches
 from catenary.solver.ensemble import marches
-from catenary.solver.ensemble.shared_line import N_LANES
 from catenary.solver.kernels import native
 from catenary.solver.statics.line_at_rest import line_at_rest
 
@@ -104,9 +103,9 @@ def test_lanes_are_filled_again_with_trains_of_other_lengths() -> None:
     pair = [{"name": "moving_frame"}, {"name": "moving_frame", "behind_m": 60.0}]
     name = read_draft("en50318_2002").scene().train.pantographs[0].name
     pair = [{**place, "name": name} for place in pair]
-    changes: list[dict[str, Any]] = [{"train.speed_km_h": 200.0 + 10.0 * k} for k in range(6)]
+    changes: list[dict[str, Any]] = [{"train.speed_km_h": 200.0 + 10.0 * k} for k in range(9)]
     changes.insert(2, {"train.speed_km_h": 250.0, "train.pantographs": pair})
-    assert len(changes) > N_LANES
+    assert len(changes) > 8  # the most lanes
     found, together = marched(scenes_of("en50318_2002", changes))
     assert together
     for number in (2, 6):

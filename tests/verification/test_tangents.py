@@ -238,7 +238,7 @@ def test_tangents_side_by_side_are_those_of_each_alone() -> None:
     names = ["tension", "static force", "damping", "contact stiffness"]
     changes = [change_of(problem, name) for name in names]
     changes += [differentiate(faster, now, 1e-3, "speed"), changes[0], changes[2]]
-    assert sum(change.loads_line for change in changes) == 5 > native.SCENES
+    assert sum(change.loads_line for change in changes) > 4
     alone = [march_with_tangents(COMM, rest, [change]) for change in changes]
     best, *others = reversed(native.targets())
     try:

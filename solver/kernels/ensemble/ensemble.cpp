@@ -1,14 +1,14 @@
 // Steps of all lanes, each as far as its scene goes.
 #include "ensemble/ensemble.hpp"
 
-#include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "base/flush_to_zero.hpp"
 
 namespace catenary {
 
-void Ensemble::begin(int lane, Steps& steps, int64_t n) {
+void Ensemble::begin(int64_t lane, Steps& steps, int64_t n) {
     if (n < 0 || n > steps.n_steps()) throw std::out_of_range("a block has not as many steps");
     marches_.at(lane) = {&steps, 0, n, false};
 }
@@ -19,17 +19,16 @@ void Ensemble::take(int64_t most) {
         for (March& march : marches_)
             if (goes_on(march)) march.steps->set_off(march.next);
         passes_.step();
-        std::array<bool, kScenes> moves{};
         bool all_go_on = true;
-        for (int lane = 0; lane < kScenes; ++lane) {
+        for (size_t lane = 0; lane < marches_.size(); ++lane) {
             March& march = marches_[lane];
-            moves[lane] = goes_on(march);
-            if (!moves[lane]) continue;
+            none_[lane] = goes_on(march) ? 0.0 : std::numeric_limits<double>::infinity();
+            if (!goes_on(march)) continue;
             march.is_left = !march.steps->arrive(march.next);
             if (!march.is_left) march.steps->show(march.next++);
             all_go_on &= goes_on(march);
         }
-        passes_.take(extremes_, moves);
+        passes_.take(extremes_, none_);
         if (!all_go_on) break;
     }
     restore_subnormals(before);

@@ -18,13 +18,15 @@ class Ensemble {
     Ensemble(ScenePasses& passes, LineExtremes extremes)
         : passes_(passes), extremes_(std::move(extremes)) {
         passes_.make_room(extremes_.droppers.law.size());
+        marches_.resize(passes_.n());
+        none_.resize(passes_.n());
     }
 
     /// Begin a scene in a lane, whose line is at rest, with n steps of its block.
-    void begin(int lane, Steps& steps, int64_t n);
+    void begin(int64_t lane, Steps& steps, int64_t n);
     /// Take steps until a scene is at its end, or left, or until so many were taken.
     void take(int64_t most);
-    const March& at(int lane) const { return marches_.at(lane); }
+    const March& at(int64_t lane) const { return marches_.at(lane); }
 
   private:
     bool goes_on(const March& march) const {
@@ -33,7 +35,8 @@ class Ensemble {
 
     ScenePasses& passes_;
     LineExtremes extremes_;
-    std::array<March, kScenes> marches_{};
+    std::vector<March> marches_;  ///< in all lanes
+    std::vector<double> none_;    ///< of each lane 0 if it goes on, else infinite
 };
 
 }  // namespace catenary

@@ -2,7 +2,6 @@
 #include "ensemble/scene_passes.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
 
 #include "base/targets.hpp"
@@ -11,83 +10,102 @@ namespace catenary {
 
 namespace {
 
-/// Numbers of all scenes as a vector, aligned as doubles.
-typedef double Scenes __attribute__((vector_size(8 * kScenes), aligned(8), may_alias));
-
-const Scenes& at(const double* numbers) {
-    return *reinterpret_cast<const Scenes*>(numbers);
-}
-Scenes& at(double* numbers) {
-    return *reinterpret_cast<Scenes*>(numbers);
-}
-
 /// Fill in the reserve of each link from `begin` to `end` in all scenes, from the reserves at rest.
-CATENARY_FOR_TARGETS
-void find_reserves(const Motion& motion, const Links& links, const double* rest, int64_t begin,
-                   int64_t end, double* result) {
+template <int64_t L>
+[[gnu::always_inline]] inline void find_reserves(const Motion& motion, const Links& links,
+                                                 const double* rest, int64_t begin, int64_t end,
+                                                 double* result) {
+    using Scenes = SideBySide<L>;
     const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
     const double *s = motion.shares.data(), *weight = links.weights.data;
     const int64_t* unknown = links.unknowns.data;
     const int64_t m = links.unknowns.columns;
     for (int64_t link = begin; link < end; ++link) {
-        Scenes of_x{}, of_y{}, of_z{};
+        typename Scenes::Numbers of_x{}, of_y{}, of_z{};
         for (int64_t k = m * link; k < m * (link + 1); ++k) {
-            const int64_t place = unknown[k] * kScenes;
-            of_x += weight[k] * at(x + place);
-            of_y += weight[k] * at(y + place);
-            of_z += weight[k] * at(z + place);
+            const int64_t place = unknown[k] * L;
+            of_x += weight[k] * Scenes::at(x + place);
+            of_y += weight[k] * Scenes::at(y + place);
+            of_z += weight[k] * Scenes::at(z + place);
         }
         const Reserve& law = links.law[link];
-        const Scenes stretch = s[0] * of_x + s[1] * of_y + s[2] * of_z;
-        at(result + kScenes * link) = at(rest + kScenes * link) + law.stiffness * stretch +
-                                      law.damping * (s[3] * of_y + s[4] * of_z);
+        const auto stretch = s[0] * of_x + s[1] * of_y + s[2] * of_z;
+        Scenes::at(result + L * link) = Scenes::at(rest + L * link) + law.stiffness * stretch +
+                                        law.damping * (s[3] * of_y + s[4] * of_z);
     }
 }
-
-/// Take forces of links with these reserves into their extremes. `none` (kScenes,) is 0 of scenes
-/// that take part, infinite of the others.
 CATENARY_FOR_TARGETS
-void take_forces(std::span<const Reserve> laws, const double* reserves, const double* none,
-                 double* least, double* largest) {
-    const Scenes left_out = at(none), nothing{};
+void find_reserves(const Motion& motion, const Links& links, const double* rest, int64_t begin,
+                   int64_t end, double* result) {
+    with_lanes(motion.spacing, [&](auto n) __attribute__((always_inline)) {
+        find_reserves<n>(motion, links, rest, begin, end, result);
+    });
+}
+
+/// Take forces of links with these reserves into their extremes. `none` (L,) is 0 of scenes that
+/// take part, infinite of the others.
+template <int64_t L>
+[[gnu::always_inline]] inline void take_forces(std::span<const Reserve> laws,
+                                               const double* reserves, const double* none,
+                                               double* least, double* largest) {
+    using Scenes = SideBySide<L>;
+    const typename Scenes::Numbers left_out = Scenes::at(none), nothing{};
     for (int64_t link = 0; link < size(laws); ++link) {
         const Reserve& law = laws[link];
-        const Scenes reserve = at(reserves + kScenes * link);
-        const Scenes whole = law.carried * reserve, part = whole - law.released * reserve;
-        const Scenes force = reserve < nothing ? part : whole;
-        Scenes &low = at(least + kScenes * link), &high = at(largest + kScenes * link);
-        const Scenes down = force + left_out, up = force - left_out;
+        const typename Scenes::Numbers reserve = Scenes::at(reserves + L * link);
+        const auto whole = law.carried * reserve, part = whole - law.released * reserve;
+        const auto force = reserve < nothing ? part : whole;
+        typename Scenes::InMemory &low = Scenes::at(least + L * link),
+                                  &high = Scenes::at(largest + L * link);
+        const auto down = force + left_out, up = force - left_out;
         low = down < low ? down : low;
         high = up > high ? up : high;
     }
 }
+CATENARY_FOR_TARGETS
+void take_forces(std::span<const Reserve> laws, const double* reserves,
+                 std::span<const double> none, double* least, double* largest) {
+    with_lanes(size(none), [&](auto n) __attribute__((always_inline)) {
+        take_forces<n>(laws, reserves, none.data(), least, largest);
+    });
+}
 
 /// Take displacements of unknowns into their largest ones, as `take_forces`.
-CATENARY_FOR_TARGETS
-void take_uplift(const Motion& motion, std::span<const int64_t> unknowns, const double* none,
-                 double* largest) {
+template <int64_t L>
+[[gnu::always_inline]] inline void take_uplift(const Motion& motion,
+                                               std::span<const int64_t> unknowns,
+                                               const double* none, double* largest) {
+    using Scenes = SideBySide<L>;
     const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
     const double* s = motion.shares.data();
-    const Scenes left_out = at(none);
+    const typename Scenes::Numbers left_out = Scenes::at(none);
     for (int64_t arm = 0; arm < size(unknowns); ++arm) {
-        const int64_t place = unknowns[arm] * kScenes;
-        const Scenes now = s[0] * at(x + place) + s[1] * at(y + place) + s[2] * at(z + place);
-        const Scenes up = now - left_out;
-        Scenes& high = at(largest + kScenes * arm);
+        const int64_t at = unknowns[arm] * L;
+        const auto up = s[0] * Scenes::at(x + at) + s[1] * Scenes::at(y + at) +
+                        s[2] * Scenes::at(z + at) - left_out;
+        typename Scenes::InMemory& high = Scenes::at(largest + L * arm);
         high = up > high ? up : high;
     }
+}
+CATENARY_FOR_TARGETS
+void take_uplift(const Motion& motion, std::span<const int64_t> unknowns,
+                 std::span<const double> none, double* largest) {
+    with_lanes(size(none), [&](auto n) __attribute__((always_inline)) {
+        take_uplift<n>(motion, unknowns, none.data(), largest);
+    });
 }
 
 }  // namespace
 
-ScenePasses::ScenePasses(PassParts parts) : parts_(std::move(parts)), line_(parts_, kScenes) {
+ScenePasses::ScenePasses(PassParts parts)
+    : parts_(std::move(parts)), line_(parts_, static_cast<int>(parts_.arrays.motion.spacing)) {
     if (!parts_.arrays.known.empty())
         throw std::invalid_argument("scenes side by side take steps of Newmark's method only");
 }
 
 void ScenePasses::track(const TrackedLinks& tracked, Array2<const double> rest,
                         std::vector<std::span<double>> reserves) {
-    if (reserves.size() != kScenes || rest.columns != kScenes)
+    if (std::ssize(reserves) != n() || rest.columns != n())
         throw std::invalid_argument("a scene has no reserves");
     tracked_ = tracked;
     rest_ = rest;
@@ -96,7 +114,7 @@ void ScenePasses::track(const TrackedLinks& tracked, Array2<const double> rest,
 }
 
 void ScenePasses::make_room(size_t n_links) {
-    found_.resize(std::max(found_.size(), n_links * kScenes));
+    found_.resize(std::max(found_.size(), n_links * n()));
 }
 
 void ScenePasses::step() {
@@ -115,13 +133,10 @@ void ScenePasses::find_reserves(int64_t begin, int64_t end) {
     catenary::find_reserves(parts_.arrays.motion, tracked_.links, rest_.data, begin, end,
                             found_.data());
     for (int64_t link = begin; link < end; ++link)
-        for (int s = 0; s < kScenes; ++s) reserves_[s][link] = found_[kScenes * link + s];
+        for (int64_t s = 0; s < n(); ++s) reserves_[s][link] = found_[n() * link + s];
 }
 
-void ScenePasses::take(const LineExtremes& extremes, const std::array<bool, kScenes>& moves) {
-    double none[kScenes];
-    for (int s = 0; s < kScenes; ++s)
-        none[s] = moves[s] ? 0.0 : std::numeric_limits<double>::infinity();
+void ScenePasses::take(const LineExtremes& extremes, std::span<const double> none) {
     const Motion& motion = parts_.arrays.motion;
     take_uplift(motion, extremes.arms, none, extremes.uplift.data);
     const auto laws = extremes.droppers.law;
@@ -130,10 +145,10 @@ void ScenePasses::take(const LineExtremes& extremes, const std::array<bool, kSce
     take_forces(laws, found_.data(), none, extremes.least.data, extremes.largest.data);
 }
 
-void ScenePasses::rest(int scene) const {
+void ScenePasses::rest(int64_t scene) const {
     const PassArrays& arrays = parts_.arrays;
-    auto clear = [scene](std::span<double> numbers) {
-        for (size_t at = scene; at < numbers.size(); at += kScenes) numbers[at] = 0.0;
+    auto clear = [scene, n = n()](std::span<double> numbers) {
+        for (int64_t at = scene; at < size(numbers); at += n) numbers[at] = 0.0;
     };
     for (auto numbers : {arrays.factor, arrays.velocity, arrays.answer}) clear(numbers);
     for (auto numbers : {arrays.motion.x, arrays.motion.y, arrays.motion.z}) clear(numbers);

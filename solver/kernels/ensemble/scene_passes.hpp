@@ -2,9 +2,7 @@
 // Free steps of a line in several scenes side by side, which share its matrices and factors.
 //
 // Numbers of an unknown in all scenes follow each other, so that a number of a matrix is read once
-// for `kScenes` of them: a step of one scene waits for memory and broadcasts.
-#include <array>
-
+// for all of them: a step of one scene waits for memory and broadcasts.
 #include "motion/two_passes.hpp"
 
 namespace catenary {
@@ -13,30 +11,32 @@ namespace catenary {
 struct LineExtremes {
     std::span<const int64_t> arms;  ///< unknowns of vertical displacement at steady arms
     Links droppers;
-    Array2<const double> rest;      ///< (n_droppers, kScenes) their reserves at rest [N]
-    Array2<double> uplift;          ///< (n_arms, kScenes) largest displacement [m]
-    Array2<double> least, largest;  ///< (n_droppers, kScenes) forces [N]
+    Array2<const double> rest;      ///< (n_droppers, n) their reserves at rest [N]
+    Array2<double> uplift;          ///< (n_arms, n) largest displacement [m]
+    Array2<double> least, largest;  ///< (n_droppers, n) forces [N]
     CATENARY_RECORD(arms, droppers, rest, uplift, least, largest)
-    CATENARY_SHAPES("a, n=d, d 4, a 4, d 4, d 4")
+    CATENARY_SHAPES("a, n=d, d l, a l, d l, d l")
 };
 
 class ScenePasses : private Around {
   public:
-    /// Arrays of `parts` are for all scenes. Throws std::invalid_argument as `PassLine`, or if the
-    /// method is not Newmark's.
+    /// Arrays of `parts` are for n scenes, `kScenes` or `kMostScenes`, which the spacing of the
+    /// motion is. Throws std::invalid_argument as `PassLine`, or if the method is not Newmark's.
     explicit ScenePasses(PassParts parts);
+    int64_t n() const { return parts_.arrays.motion.spacing; }
 
     /// Fill the reserves (n,) of links in each scene in a free step; `tracked` as for one scene,
-    /// but that links have other reserves at rest (n, kScenes) [N].
+    /// but that links have other reserves at rest (n_links, n) [N].
     void track(const TrackedLinks& tracked, Array2<const double> rest,
                std::vector<std::span<double>> reserves);
     /// Make room for the reserves of so many links.
     void make_room(size_t n_links);
     void step();
-    /// Take the present motion into the extremes of scenes with `moves`.
-    void take(const LineExtremes& extremes, const std::array<bool, kScenes>& moves);
+    /// Take the present motion into the extremes of scenes for which `none` (n,) is 0, not of those
+    /// for which it is infinite.
+    void take(const LineExtremes& extremes, std::span<const double> none);
     /// Put a scene's line at rest.
-    void rest(int scene) const;
+    void rest(int64_t scene) const;
 
   private:
     void before() override { n_followed_ = 0; }

@@ -1,4 +1,6 @@
 // Python bindings of marches side by side.
+#include <algorithm>
+
 #include "ensemble/ensemble.hpp"
 #include "python/pass_parts.hpp"
 
@@ -26,8 +28,8 @@ class HeldScenePasses : public ScenePasses {
             From<std::vector<std::span<double>>>::convert(reserves, "reserves", kept));
         of_links_ = std::move(kept);
     }
-    void rest(int lane) {
-        if (lane < 0 || lane >= kScenes) throw py::index_error("there is no such lane");
+    void rest(int64_t lane) {
+        if (lane < 0 || lane >= n()) throw py::index_error("there is no such lane");
         ScenePasses::rest(lane);
     }
 
@@ -41,15 +43,15 @@ class HeldEnsemble {
     HeldEnsemble(const py::object& passes, const py::object& extremes)
         : passes_(passes),
           own_(passes.cast<ScenePasses&>(),
-               From<LineExtremes>::convert(extremes, "extremes", kept_)) {}
+               From<LineExtremes>::convert(extremes, "extremes", kept_)),
+          of_lanes_(passes.cast<ScenePasses&>().n()) {}
 
-    void begin(int lane, const py::object& steps, int64_t n) {
-        if (lane < 0 || lane >= kScenes) throw py::index_error("there is no such lane");
+    void begin(int64_t lane, const py::object& steps, int64_t n) {
         own_.begin(lane, steps.cast<Steps&>(), n);
-        of_lanes_[lane] = steps;
+        of_lanes_.at(lane) = steps;
     }
     void take(int64_t most) { own_.take(most); }
-    py::tuple at(int lane) const {
+    py::tuple at(int64_t lane) const {
         const March& march = own_.at(lane);
         return py::make_tuple(march.next, march.is_left);
     }
@@ -57,21 +59,27 @@ class HeldEnsemble {
   private:
     Kept kept_;
     py::object passes_;
-    std::array<py::object, kScenes> of_lanes_;
     Ensemble own_;
+    std::vector<py::object> of_lanes_;
 };
 
-bool are_compiled_for_scenes(const Layout& rows, const Layout& factors, int scenes) {
-    return kernels_for_scenes(rows, factors, scenes) != nullptr;
+/// Numbers of scenes, ascending, that kernels step side by side on a line of these layouts.
+std::vector<int> scenes_at_once(const std::vector<Layout>& rows,
+                                const std::vector<Layout>& factors) {
+    std::vector<int> found;
+    for (const int scenes : {kScenes, kMostScenes}) {
+        const auto are_compiled = [&](const Layout& of_rows, const Layout& of_factors) {
+            return kernels_for_scenes(of_rows, of_factors, scenes) != nullptr;
+        };
+        if (std::ranges::equal(rows, factors, are_compiled)) found.push_back(scenes);
+    }
+    return found;
 }
 
 }  // namespace
 
 void offer_ensemble(py::module_& module) {
-    module.attr("SCENES") = kScenes;
-    module.attr("MOST_SCENES") = kMostScenes;
-    module.def("are_compiled_for_scenes", &are_compiled_for_scenes, py::arg("rows"),
-               py::arg("factors"), py::arg("scenes") = kScenes);
+    module.def("scenes_at_once", &scenes_at_once);
     py::class_<ScenePasses>(module, "SceneSteps").def("step", &ScenePasses::step);
     py::class_<HeldScenePasses, ScenePasses>(module, "ScenePasses")
         .def(py::init(&HeldScenePasses::made))

@@ -18,12 +18,13 @@
 #include <array>
 #include <cstdint>
 
+#include "base/side_by_side.hpp"
+
 namespace catenary {
 
 constexpr int kMostUnknowns = 32, kMostPieces = 8, kKinds = 4;
-/// Scenes that kernels step side by side: four, or eight where vectors hold them; and the most
-/// numbers of a station in all of them.
-constexpr int kScenes = 4, kMostScenes = 8, kMostNumbers = 64;
+/// Numbers of a station in all scenes that stand side by side.
+constexpr int kMostNumbers = 64;
 
 /// Kinds of products of each square, a bit for each.
 using Mask = std::array<std::array<uint8_t, kMostPieces>, kMostPieces>;

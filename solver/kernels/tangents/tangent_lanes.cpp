@@ -10,39 +10,23 @@ namespace catenary {
 
 namespace {
 
-/// Numbers of an unknown in L lanes, and as they stand in memory.
-template <int64_t L>
-struct Wide {
-    typedef double Numbers __attribute__((vector_size(8 * L)));
-    typedef double InMemory __attribute__((vector_size(8 * L), aligned(8), may_alias));
-    static InMemory& at(double* numbers) { return *reinterpret_cast<InMemory*>(numbers); }
-    static const InMemory& at(const double* numbers) {
-        return *reinterpret_cast<const InMemory*>(numbers);
-    }
-};
-template <>
-struct Wide<1> {
-    using Numbers = double;
-    static double& at(double* numbers) { return *numbers; }
-    static double at(const double* numbers) { return *numbers; }
-};
-
 /// Put the sums of the march's motion from unknown `begin` to `end` with the weights of a term.
 template <int64_t L>
 [[gnu::always_inline]] inline void add_up(const Motion& march, const double* weights, int64_t begin,
                                           int64_t end, double* sums) {
-    const typename Wide<L>::Numbers by_x = Wide<L>::at(weights), by_y = Wide<L>::at(weights + L),
-                                    by_z = Wide<L>::at(weights + 2 * L);
+    const typename SideBySide<L>::Numbers by_x = SideBySide<L>::at(weights),
+                                          by_y = SideBySide<L>::at(weights + L),
+                                          by_z = SideBySide<L>::at(weights + 2 * L);
     const double *x = march.x.data(), *y = march.y.data(), *z = march.z.data();
     for (int64_t u = begin; u < end; ++u)
-        Wide<L>::at(sums + L * (u - begin)) = x[u] * by_x + y[u] * by_y + z[u] * by_z;
+        SideBySide<L>::at(sums + L * (u - begin)) = x[u] * by_x + y[u] * by_y + z[u] * by_z;
 }
 
 /// Put the loads of pairs of rows from `first` to `last` by sums that begin with unknown `from`.
 template <int64_t L>
 [[gnu::always_inline]] inline void multiply(const ChangedRows& rows, int64_t first, int64_t last,
                                             int64_t from, double* loads) {
-    using Numbers = typename Wide<L>::Numbers;
+    using Numbers = typename SideBySide<L>::Numbers;
     const int64_t* begin = rows.begin.data();
     const int32_t* offsets = rows.offsets.data();
     const double *values = rows.values.data, *sums = rows.sums.data();
@@ -52,9 +36,9 @@ template <int64_t L>
         Numbers one{}, other{}, next_one{}, next_other{};
         const auto subtract = [&](int64_t k, Numbers& one, Numbers& other)
                                   __attribute__((always_inline)) {
-                                      const Numbers sum = Wide<L>::at(own + L * offsets[k]);
-                                      one -= sum * Wide<L>::at(values + 2 * L * k);
-                                      other -= sum * Wide<L>::at(values + 2 * L * k + L);
+                                      const Numbers sum = SideBySide<L>::at(own + L * offsets[k]);
+                                      one -= sum * SideBySide<L>::at(values + 2 * L * k);
+                                      other -= sum * SideBySide<L>::at(values + 2 * L * k + L);
                                   };
         int64_t k = begin[rows.kinds[pair]];
         const int64_t end = begin[rows.kinds[pair] + 1];
@@ -63,8 +47,8 @@ template <int64_t L>
             subtract(k + 1, next_one, next_other);
         }
         if (k < end) subtract(k, one, other);
-        Wide<L>::at(loads + 2 * L * pair) = one + next_one;
-        Wide<L>::at(loads + 2 * L * pair + L) = other + next_other;
+        SideBySide<L>::at(loads + 2 * L * pair) = one + next_one;
+        SideBySide<L>::at(loads + 2 * L * pair + L) = other + next_other;
     }
 }
 
@@ -82,13 +66,7 @@ template <int64_t L>
         multiply<L>(rows, first, last, from, loads);
     }
 }
-/// Call a function with the number of lanes as a constant.
-template <class F>
-[[gnu::always_inline]] inline void with_lanes(int64_t n, F&& function) {
-    if (n == 1) return function(std::integral_constant<int64_t, 1>{});
-    if (n == kScenes) return function(std::integral_constant<int64_t, kScenes>{});
-    function(std::integral_constant<int64_t, kMostScenes>{});
-}
+
 CATENARY_FOR_TARGETS
 void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t low, int64_t high,
           double* loads) {
@@ -101,12 +79,13 @@ void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t
 template <int64_t L>
 [[gnu::always_inline]] inline void add(const double* forces, const double* answer, int64_t n,
                                        double* x, double* y, double* z, const double* gains) {
-    const typename Wide<L>::Numbers force = Wide<L>::at(forces), to_x = gains[0] * force,
-                                    to_y = gains[1] * force, to_z = gains[2] * force;
+    const typename SideBySide<L>::Numbers force = SideBySide<L>::at(forces),
+                                          to_x = gains[0] * force, to_y = gains[1] * force,
+                                          to_z = gains[2] * force;
     for (int64_t j = 0; j < n; ++j) {
-        Wide<L>::at(x + L * j) += to_x * answer[j];
-        Wide<L>::at(y + L * j) += to_y * answer[j];
-        Wide<L>::at(z + L * j) += to_z * answer[j];
+        SideBySide<L>::at(x + L * j) += to_x * answer[j];
+        SideBySide<L>::at(y + L * j) += to_y * answer[j];
+        SideBySide<L>::at(z + L * j) += to_z * answer[j];
     }
 }
 CATENARY_FOR_TARGETS
