@@ -15,12 +15,17 @@ from scenes import Scene, mesh_of, problem_of, read_draft
 
 import catenary
 from catenary import InputError
+from catenary.base.lone_process import alone
+from catenary.cases.run.prepared import sound_rest
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.studies import ensemble as scenes_on_lines
 from catenary.cases.studies.ensemble import Marched, Marches
-from catenary.solver.ensemble import marches
+from catenary.solver.ensemble import marches, shared_line
+from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
+from catenary.solver.ensemble.shared_line import SharedLine
 from catenary.solver.kernels import native
 from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.time_loop.march import March
 
 # Of the summary of an own run what studies read.
 READ = ("pantographs", "histograms", "droppers", "acceptance", "not_judged", "passed", "remarks")
@@ -110,6 +115,27 @@ def test_lanes_are_filled_again_with_trains_of_other_lengths() -> None:
     assert together
     for number in (2, 6):
         assert differences(found[number].summary(), own_run("en50318_2002", changes[number])) == []
+
+
+def test_any_number_of_lanes_gives_the_same_motions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit: a processor's choice of lanes changes no table."""
+    at_rest = sound_rest(scenes_of("en50318_2002", [{}])[0])
+    with March(alone(), *at_rest) as march:
+        passes = march.in_loop()[0].interaction.line.passes
+        assert passes is not None
+        numbers = passes.scenes_at_once
+    found = []
+    for n in numbers:
+        monkeypatch.setattr(shared_line, "_quickest", lambda _, n=n: n)
+        shared = SharedLine(at_rest, (-1e9, 1e9))
+        assert len(shared.lanes) == n
+        [own] = march_side_by_side(shared, [(0, at_rest)])
+        assert isinstance(own, SceneHistory)
+        found.append((own.contact_force, own.uplift, own.dropper_force))
+        shared.destroy()
+    for other in found[1:]:
+        for one, two in zip(found[0], other, strict=True):
+            np.testing.assert_array_equal(one, two)
 
 
 @pytest.mark.parametrize(
