@@ -202,7 +202,7 @@ class Marches:
         if self._line is None or key != self._key or not self._line.serves(begin, end, together):
             self.destroy()
             range_of_run = (begin - _BEYOND, end + _BEYOND) if together else None
-            self._line = _Line(scenes[first], problems[first], range_of_run)
+            self._line = _Line(scenes[first], problems[first], range_of_run, len(problems))
             self._key = key
         return self._line
 
@@ -226,10 +226,15 @@ class _Line:
     ----------
     scene, problem : of one of the scenes
     range_of_run : stretch that their trains touch the wire in [m], None if they march by themselves
+    n_scenes : so many march at once
     """
 
     def __init__(
-        self, scene: Scene, problem: Problem, range_of_run: tuple[float, float] | None
+        self,
+        scene: Scene,
+        problem: Problem,
+        range_of_run: tuple[float, float] | None,
+        n_scenes: int,
     ) -> None:
         self._mesh = mesh_of(scene)
         self._errors = problem.irregularities.lengths
@@ -241,7 +246,7 @@ class _Line:
         self._range = range_of_run
         self.shared: SharedLine | None = None
         if range_of_run is not None:
-            shared = SharedLine(at_rest, range_of_run)
+            shared = SharedLine(at_rest, range_of_run, n_scenes)
             if shared.steps_together:
                 self.shared = shared
             else:

@@ -50,7 +50,7 @@ def test_cost_of_a_step_in_lanes(case: str) -> None:
     try:
         for target in native.targets()[1:]:
             native.set_target(target)
-            shared = SharedLine(at_rest, whole)
+            shared = SharedLine(at_rest, whole, 8)
             times = [(alone(at_rest), in_lanes(shared, at_rest)) for _ in range(ROUNDS)]
             single, lane = (min(of) for of in zip(*times, strict=True))
             print(f"{case}, {target}: alone {single:.1f} us a step, in {len(shared.lanes)} lanes "

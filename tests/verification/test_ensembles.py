@@ -126,8 +126,8 @@ def test_any_number_of_lanes_gives_the_same_motions(monkeypatch: pytest.MonkeyPa
         numbers = passes.scenes_at_once
     found = []
     for n in numbers:
-        monkeypatch.setattr(shared_line, "_quickest", lambda _, n=n: n)
-        shared = SharedLine(at_rest, (-1e9, 1e9))
+        monkeypatch.setattr(shared_line, "_quickest", lambda *_, n=n: n)
+        shared = SharedLine(at_rest, (-1e9, 1e9), n)
         assert len(shared.lanes) == n
         [own] = march_side_by_side(shared, [(0, at_rest)])
         assert isinstance(own, SceneHistory)

@@ -36,9 +36,9 @@ from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 
 # Variants of a piece of work at most: some seconds, that a stop may cost. Of few variants pieces
-# are smaller, so that all cores have some; they do not depend on the number of cores, as a sweep
-# that was stopped may go on with more.
-_MOST, _LEAST, _PIECES = 64, 4, 16
+# are smaller, so that all cores have some, but fill four or eight lanes; they do not depend on the
+# machine, as a sweep that was stopped may go on with more cores.
+_MOST, _LEAST, _LANES, _PIECES = 64, 4, 8, 16
 
 
 class Ensemble(NamedTuple):
@@ -77,7 +77,8 @@ class Ensemble(NamedTuple):
         options : options of the runs
         part : part of the pieces of work, None for all
         """
-        size = max(_LEAST, min(_MOST, -(-len(self.variants) // _PIECES)))
+        lots = -(-len(self.variants) // (_PIECES * _LANES))
+        size = _LEAST if len(self.variants) <= _PIECES * _LEAST else min(_MOST, _LANES * lots)
         pieces = pieces_of_work(self.variants, size)
         if part is not None:
             pieces = part.of(pieces)
