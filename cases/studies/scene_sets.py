@@ -23,6 +23,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import FORWARD, turned
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import OF_LINE, STATISTICS, statistics_of
+from catenary.cases.studies.sweep.variants import share_a_value
 
 if TYPE_CHECKING:
     from catenary.cases.studies.ensemble import Marches
@@ -227,6 +228,29 @@ class SceneSet:
             except InputError as error:
                 raise InputError(f"scene {member.name}: {error}") from error
         return self
+
+
+def refuse_shared(members: Sequence[Member], key: str, where: str) -> None:
+    """Refuse a key that a study varies and a set gives as well: the set's value would be lost.
+
+    Parameters
+    ----------
+    members : of the set
+    key : dotted key that is varied
+    where : the place in the task that names it
+
+    Raises
+    ------
+    InputError
+        If a member has a value of its own there, above or below.
+    """
+    for member in members:
+        for given, _ in member.values:
+            if share_a_value(given, key):
+                raise InputError(
+                    f"{where} varies {key}, but the scene {member.name} of the set has its own "
+                    f"{given}, which would be lost; leave one of them out"
+                )
 
 
 BROKE = "broke"

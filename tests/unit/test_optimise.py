@@ -337,6 +337,28 @@ def test_variables_that_a_case_has_not_are_refused(table: dict[str, Any], says: 
 @pytest.mark.parametrize(
     ("tables", "says"),
     [
+        (
+            {"variables": [{"key": key, "change": [-1.0, 1.0]} for key in (HEAD, f"{HEAD}.0")]},
+            f"variables.1.key is {HEAD}.0, which is varied twice, also by {HEAD}",
+        ),
+        (
+            {"set": {"trains": {"single": [f"{HEAD}=[7.0, 15.0]"]}}},
+            f"variables.0 varies {HEAD}, but the scene forward, single of the set has its own",
+        ),
+        (
+            {"search": {"values": [f"{HEAD}=[7.0, 15.0]"]}},
+            f"search.values give {HEAD}, which variables.0 vary",
+        ),
+    ],
+)
+def test_a_key_that_is_set_again_is_refused(tables: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        study.make_plan(draft(), task_of(**tables))
+
+
+@pytest.mark.parametrize(
+    ("tables", "says"),
+    [
         ({"variables": [{"key": "a"}]}, "needs change or bounds"),
         ({"variables": [{"key": "a", "change": [1.0, 2.0]}]}, "must have 0 within change"),
         ({"objective": {"statistic": "sigma"}}, "must be one of mean_N"),

@@ -105,6 +105,47 @@ def test_tensions_are_wrong_by_shares() -> None:
     assert heavier.pantographs["reference"].masses_kg == [7.2, 15.5]
 
 
+def test_entries_of_one_list_are_wrong_together(evaluated: Any) -> None:
+    """By hand: masses of 7.2 and 15 kg, to each of which all together add an error of its own."""
+    head = {**SPEED, "name": "head", "key": "pantographs.reference.masses_kg.0", "level": 0.5}
+    frame = {**head, "name": "frame", "key": "pantographs.reference.masses_kg", "entry": 2}
+    groups = groups_of(task_of(head, frame).errors, tiny().scene())
+    values: dict[str, Any] = {}
+    for group, error in zip(groups, (0.5, -1.0), strict=True):
+        values |= group.values(np.array([error]), values)
+    assert values == {"pantographs.reference.masses_kg": [7.7, 14.0]}
+
+    def by_masses(scene: Scene) -> float:
+        first, second = scene.pantographs["reference"].masses_kg
+        return 29.5 + abs(first - 7.2) + abs(second - 15.0)
+
+    evaluated(by_masses)
+    errors = [{**own, "most": 0.5} for own in (head, frame)]
+    samples = {"worst_case": False, "probability": 0.9, "confidence": 0.5, "resolution": 0.01}
+    plan = make_plan(tiny(), task_of(*errors, samples=samples))
+    alone, _, together = find_tolerances(plan)
+    # Alone an error of 0.5 kg just keeps the bound of 30 N; two of 0.5 kg each do not.
+    assert alone.at_most and not together.at_most
+
+
+@pytest.mark.parametrize(
+    ("of_set", "error", "says"),
+    [
+        ({"speeds_km_h": [200.0, 250.0]}, SPEED, "errors.0 varies train.speed_km_h, but the scene"),
+        (
+            {"trains": {"single": ["pantographs.reference.masses_kg=[7.0, 15.0]"]}},
+            {**SPEED, "key": "pantographs.reference.masses_kg", "entry": 1},
+            "has its own pantographs.reference.masses_kg, which would be lost",
+        ),
+    ],
+)
+def test_errors_of_what_the_set_gives_are_refused(
+    of_set: dict[str, Any], error: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(InputError, match=says):
+        make_plan(tiny(), task_of(error, set={**FORWARD, **of_set}))
+
+
 @pytest.mark.parametrize("distribution", ["uniform", "normal"])
 def test_errors_stay_within_their_tolerance(distribution: str) -> None:
     group = group_of({**DROPPERS, "distribution": distribution}, tiny().scene())
@@ -414,6 +455,13 @@ def test_an_installer_reads_which_criteria_nothing_helps_and_which_nothing_loses
     [
         ([SPEED, {**SPEED, "name": "again"}], "as errors.0 are; give one of them"),
         ([SPEED, {**TENSION, "name": "speed"}], "a name of its own"),
+        (
+            [
+                {**SPEED, "key": "pantographs.reference.masses_kg.1"},
+                {**SPEED, "name": "b", "key": "pantographs.reference.masses_kg", "entry": 2},
+            ],
+            "errors.1 are of pantographs.reference.masses_kg 2, as errors.0 are",
+        ),
         ([{**SPEED, "key": "line.topology"}], "no number"),
         ([{**SPEED, "key": "pantographs.reference.masses_kg"}], "errors.0.entry names one"),
         ([{**SPEED, "level": -1.0}], "^errors.0.level is -1.0 in"),

@@ -12,6 +12,7 @@ from catenary.cases.cli.varied_words import each_varied
 
 CASE = "en50318_2002"
 SPEEDS, LAWS = "train.speed_km_h=200,250", "contact.stiffness_N_per_m=2e4,5e4"
+MASSES = "pantographs.reference.masses_kg"
 STEP = "numerics.dt_s=0.004"
 
 
@@ -71,6 +72,10 @@ def test_submitted_sweeps_vary_them_too(tmp_path: Path) -> None:
         (["--vary", SPEEDS, "contact.stifness_N_per_m=2e4,5e4"], "line (--vary) is unknown"),
         (["--vary", SPEEDS, "contact.stiffness_N_per_m=2e4,"], '--vary "contact.stiffness_N_per'),
         (["--vary", SPEEDS, SPEEDS], "--vary train.speed_km_h is given twice"),
+        (
+            ["--vary", f"{MASSES}.1=15,16", f"{MASSES}=[7,15],[8,15]"],
+            f"--vary {MASSES} sets {MASSES}.1 again",
+        ),
         (["--vary", SPEEDS, "--set", LAWS], "on the command line (--set)"),
     ],
 )

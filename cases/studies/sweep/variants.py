@@ -161,6 +161,17 @@ def check_key(key: str, where: str) -> None:
         raise InputError(unknown_key(key, where, known))
 
 
+def share_a_value(key: str, other: str) -> bool:
+    """Whether two dotted keys are the same, or one of them stands within the other."""
+    shorter, longer = sorted((_parts(key), _parts(other)), key=len)
+    return longer[: len(shorter)] == shorter
+
+
+def _parts(key: str) -> list[str]:
+    """The parts of a dotted key, numbers of entries without zeros in front."""
+    return [str(int(part)) if part.isdecimal() else part for part in key.split(".")]
+
+
 def _quoted(value: Any) -> str:
     """Text of a value within a list or a table, where texts stand in quotes."""
     return json.dumps(value) if isinstance(value, str) else text_of(value)
@@ -194,12 +205,18 @@ def product(
     Raises
     ------
     InputError
-        If a key is varied twice or there are too many combinations.
+        If a key is varied twice, or a later one sets it again, or there are too many combinations.
     """
     keys = [each.key for each in varied]
     for key in keys:
         if keys.count(key) > 1:
             raise InputError(f"--vary {key} is given twice; name all its values in one --vary")
+    for earlier, later in itertools.combinations(keys, 2):
+        if share_a_value(earlier, later) and later.count(".") <= earlier.count("."):
+            raise InputError(
+                f"--vary {later} sets {earlier} again, so that the values of the latter would be "
+                f"lost; name {later} first"
+            )
     count = max(len(named), 1)
     for each in varied:
         count *= len(each.values)
