@@ -80,6 +80,15 @@ def test_what_has_no_estimates_says_so() -> None:
     assert notes[0] == "a without an index: no two runs differ in it" and none not in notes
 
 
+def test_chosen_values_have_shares_and_no_probabilities() -> None:
+    runs = table_of(some(range(1, 31))).records()
+    sampled = output.as_text(evaluate(run_table(runs, sampling_of(SAMPLE, "s.toml"))))
+    chosen = output.as_text(evaluate(run_table(runs)))
+    assert "Probability that a criterion fails, with" in sampled and "no sampling" not in sampled
+    assert "Share of the runs in which a criterion fails, with" in chosen
+    assert "robability" not in chosen and "NOTE        no sampling is known: means, " in chosen
+
+
 def test_files_of_all_kinds_give_the_same_table(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     runs = some(range(1, 31))

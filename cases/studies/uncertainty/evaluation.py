@@ -39,6 +39,7 @@ class Uncertainty:
     sensitivity : rows of ``sensitivity.indices``
     remarks : remarks on runs, and the number of runs with each, the most frequent first
     notes : sentences on what is left out
+    is_sampled : whether the inputs are known to be samples, so that shares are probabilities
     """
 
     n_runs: int
@@ -50,6 +51,7 @@ class Uncertainty:
     sensitivity: list[Row]
     remarks: list[Row]
     notes: list[str]
+    is_sampled: bool
 
 
 def evaluate(table: RunTable) -> Uncertainty:
@@ -81,10 +83,16 @@ def evaluate(table: RunTable) -> Uncertainty:
         notes.insert(0, f"{broken} of {len(runs)} did not end{others}")
     if not statistics:
         notes.insert(0, "there are no estimates, which take figures of at least two runs")
+    is_sampled = table.sampling is not None
+    if statistics and not is_sampled:
+        notes.append(
+            "no sampling is known: means, quantiles and shares are those of these runs, and bounds "
+            "hold if their inputs are independent samples"
+        )
     probabilities = failing(independent)
     return Uncertainty(
         len(runs), n_done, statistics, quantiles, probabilities, method, sensitivity,
-        _remarks(runs), notes,
+        _remarks(runs), notes, is_sampled,
     )  # fmt: skip
 
 
