@@ -89,6 +89,22 @@ def test_chosen_values_have_shares_and_no_probabilities() -> None:
     assert "robability" not in chosen and "NOTE        no sampling is known: means, " in chosen
 
 
+def test_what_any_pantograph_fails_is_failed() -> None:
+    """Tables from elsewhere may give each pantograph its own criteria: of four runs the leading one
+    fails in one, the trailing one in three, of which one is the same."""
+    failed = {"leading": (1,), "trailing": (1, 2, 3)}
+    rows = [
+        {"variant": i, "pantograph": one, "std_N": 20.0 + i, "judged": "least force",
+         "failed": "least force" if i in own else ""}
+        for i in range(1, 5) for one, own in failed.items()
+    ]  # fmt: skip
+    for columns in (("failed", "judged"), ("failed",)):
+        left = {"failed", "judged"} - {*columns}
+        table = run_table([{k: v for k, v in row.items() if k not in left} for row in rows])
+        of_one, of_any = evaluate(table).probabilities
+        assert (of_one["failed"], of_one["n"]) == (of_any["failed"], of_any["n"]) == (3, 4)
+
+
 def test_files_of_all_kinds_give_the_same_table(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     runs = some(range(1, 31))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -124,18 +125,20 @@ def failing(table: RunTable) -> list[Row]:
     A run counts for a criterion that was judged in it. Without a column ``judged`` every criterion
     that fails in some run is taken as judged in all runs with a verdict.
     """
-    done = table.done.drop_duplicates("variant")
+    done = table.done
     if "failed" not in done:
         return []
-    failed = [list(one) for one in done["failed"]]
+    # Rows of a run have all its criteria each, or those of their pantograph.
+    runs_of = done.groupby("variant", sort=False)
+    failed = [_united(own) for _, own in runs_of["failed"]]
     if "judged" in done:
         judged = [
-            list(dict.fromkeys([*own, *more]))
-            for own, more in zip(done["judged"], failed, strict=True)
+            list(dict.fromkeys([*_united(own), *more]))
+            for (_, own), more in zip(runs_of["judged"], failed, strict=True)
         ]
     else:
         every = list(dict.fromkeys(name for own in failed for name in own))
-        known = done["passed"].notna() if "passed" in done else [True] * len(done)
+        known = runs_of["passed"].count() > 0 if "passed" in done else [True] * len(failed)
         judged = [every if one else [] for one in known]
     runs = list(zip(judged, failed, strict=True))
     rows = []
@@ -146,6 +149,11 @@ def failing(table: RunTable) -> list[Row]:
         hits = [bool(lost) for own, lost in runs if own]
         rows.append(_probability(ANY_CRITERION, sum(hits), len(hits)))
     return rows
+
+
+def _united(lists: Iterable[Sequence[str]]) -> list[str]:
+    """The criteria of all rows of a run, each once."""
+    return list(dict.fromkeys(name for own in lists for name in own))
 
 
 def _probability(criterion: str, failed: int, n: int) -> Row:
