@@ -235,3 +235,26 @@ def test_runs_that_broke_take_their_base_samples_with_them() -> None:
     rows = {row["key"]: row for row in found.sensitivity}
     for key, s1 in zip(KEYS, first, strict=True):
         check(f"S1 of {key}", rows[key]["S1"], s1, within=0.08)
+
+
+def test_indices_of_correlated_keys_hold_what_these_share() -> None:
+    """By hand: of z1 + 2 z2 + z3 with cov(z1, z2) = r the variance is 6 + 4 r, of which the means
+    under z1, z2 and z3 have (1 + 2 r)^2, (2 + r)^2 and 1: together more than all."""
+    normal = {"type": "normal", "mean": 0.0, "standard_deviation": 1.0}
+    raw = {
+        "n": 4000,
+        "keys": dict.fromkeys(KEYS, normal),
+        "correlations": [{"keys": [*KEYS[:2]], "rank": 0.6}],
+    }
+    sampling = sampling_of(raw, "sum.toml")
+    rows: list[dict[str, Any]] = []
+    for one in samples(sampling, load_scene("en50318_2002"), "sum.toml"):
+        z = [float(one.varied[key]) for key in KEYS]
+        rows.append({"variant": one.name, **dict(zip(KEYS, z, strict=True)), "outcome": "done",
+                     "std_N": z[0] + 2.0 * z[1] + z[2]})  # fmt: skip
+    found = evaluate(run_table(rows, sampling))
+    r = 2.0 * math.sin(math.pi * 0.6 / 6.0)
+    parts = ((1.0 + 2.0 * r) ** 2, (2.0 + r) ** 2, 1.0)
+    for row, part in zip(found.sensitivity, parts, strict=True):
+        check(f"S1 of {row['key']}", row["S1"], part / (6.0 + 4.0 * r), within=0.05)
+    assert found.notes == [f"the indices of {KEYS[0]} and {KEYS[1]} also hold what these share"]
