@@ -493,8 +493,7 @@ def test_the_verb_writes_what_it_says(
         '[[criteria]]\nstatistic = "std_N"\nat_most = 30.0\n[samples]\nprobability = 0.85\n'
     )
     words = ["tolerance", "en50318_2002", str(file), "-o", str(tmp_path / "out")]
-    for key, value in TINY.items():
-        words += ["--set", f"{key}={value}"]
+    words += ["--set", *(f"{key}={value}" for key, value in TINY.items())]
     done = invoke(*words)
     assert done.exit_code == 0, done.output
     assert "speed +-40 km/h: 19 of 19 lines run, " in done.output
