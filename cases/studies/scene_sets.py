@@ -23,7 +23,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import FORWARD, turned
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import OF_LINE, STATISTICS, statistics_of
-from catenary.cases.studies.sweep.variants import share_a_value
+from catenary.cases.studies.sweep.variants import sets_again, share_a_value
 
 if TYPE_CHECKING:
     from catenary.cases.studies.ensemble import Marches
@@ -154,7 +154,7 @@ def members_of(table: SetTable) -> list[Member]:
     Raises
     ------
     InputError
-        If there are more than ``MOST_SCENES``, or an assignment of a train is none.
+        If there are more than ``MOST_SCENES``, or an assignment of a train is none, or is lost.
     """
     trains = {
         name: [parse_assignment(text, f"train {name}:") for text in texts]
@@ -186,6 +186,13 @@ def _member(
         assert table.errors is not None
         values.append((f"{_LENGTHS}.standard_deviation_mm", table.errors.dropper_lengths_mm))
         values.append((f"{_LENGTHS}.seed", seed))
+    for later, _ in values[len(of_train) :]:
+        for earlier, _ in of_train:
+            if sets_again(later, earlier):
+                raise InputError(
+                    f"train {train} of the set gives {earlier}, and the set {later}, by which the "
+                    "former would be lost; leave one of them out"
+                )
     return Member(direction, speed, train, seed, tuple(values))
 
 

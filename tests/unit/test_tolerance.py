@@ -146,6 +146,15 @@ def test_errors_of_what_the_set_gives_are_refused(
         make_plan(tiny(), task_of(error, set={**FORWARD, **of_set}))
 
 
+def test_a_train_of_a_set_keeps_its_speed() -> None:
+    trains = {"slow": ["train.speed_km_h=200"]}
+    task = task_of(DROPPERS, set={**FORWARD, "trains": trains, "speeds_km_h": [250.0]})
+    with pytest.raises(InputError, match="^train slow of the set gives train.speed_km_h, and the"):
+        make_plan(tiny(), task)
+    plan = make_plan(tiny(), task_of(DROPPERS, set={**FORWARD, "trains": trains}))
+    assert plan.scenes.scene(plan.scenes.members[0]).train.speed_km_h == 200.0
+
+
 @pytest.mark.parametrize("distribution", ["uniform", "normal"])
 def test_errors_stay_within_their_tolerance(distribution: str) -> None:
     group = group_of({**DROPPERS, "distribution": distribution}, tiny().scene())

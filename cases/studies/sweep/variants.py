@@ -167,7 +167,7 @@ def share_a_value(key: str, other: str) -> bool:
     return longer[: len(shorter)] == shorter
 
 
-def _sets_again(later: str, earlier: str) -> bool:
+def sets_again(later: str, earlier: str) -> bool:
     """Whether nothing is left of the value of a dotted key when a later one is set."""
     return share_a_value(earlier, later) and later.count(".") <= earlier.count(".")
 
@@ -217,14 +217,14 @@ def product(
         if keys.count(key) > 1:
             raise InputError(f"--vary {key} is given twice; name all its values in one --vary")
     for earlier, later in itertools.combinations(keys, 2):
-        if _sets_again(later, earlier):
+        if sets_again(later, earlier):
             raise InputError(
                 f"--vary {later} sets {earlier} again, so that the values of the latter would be "
                 f"lost; name {later} first"
             )
     for (name, assignments), key in itertools.product(named.items(), keys):
         for given in (text.partition("=")[0].strip() for text in assignments):
-            if _sets_again(key, given):
+            if sets_again(key, given):
                 raise InputError(
                     f"--vary {key} sets the {given} of variant {shown(name)[1:-1]} again, so that "
                     "the latter would be lost; leave one of them out"
