@@ -23,7 +23,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import FORWARD, turned
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import OF_LINE, STATISTICS, statistics_of
-from catenary.cases.studies.sweep.variants import sets_again, share_a_value
+from catenary.cases.studies.sweep.variants import refuse_idle, sets_again, share_a_value
 
 if TYPE_CHECKING:
     from catenary.cases.studies.ensemble import Marches
@@ -227,11 +227,13 @@ class SceneSet:
         Raises
         ------
         InputError
-            With the name of the member whose scene is wrong.
+            With the name of the member whose scene is wrong, or has no errors of dropper lengths.
         """
         for member in self.members:
             try:
-                self.scene(member)
+                scene = self.scene(member)
+                if member.seed is not None:
+                    refuse_idle(_LENGTHS, scene, "set.errors")
             except InputError as error:
                 raise InputError(f"scene {member.name}: {error}") from error
         return self

@@ -436,3 +436,13 @@ def test_keys_are_nested_or_dotted(tmp_path: Path) -> None:
     assert read_sampling(nested) == read_sampling(dotted)
     with pytest.raises(InputError, match="cannot be read"):
         read_sampling(tmp_path / "nowhere.toml")
+
+
+def test_fields_that_are_switched_off_are_refused() -> None:
+    off = load_scene(CASE, ["effects.dropper_lengths=false"])
+    field = {LENGTHS: FIELD}
+    says = f"{LENGTHS} in uncertain.toml would change nothing: effects.dropper_lengths"
+    with pytest.raises(InputError, match=says):
+        drawn(off, n=4, fields=field)
+    effect = {"effects.dropper_lengths": {"type": "choices", "values": [True, False]}}
+    assert len(drawn(off, n=4, keys=effect, fields=field)) == 4

@@ -146,6 +146,19 @@ def test_errors_of_what_the_set_gives_are_refused(
         make_plan(tiny(), task_of(error, set={**FORWARD, **of_set}))
 
 
+def test_errors_that_are_switched_off_have_no_tolerance() -> None:
+    """Any length of a dropper would keep all criteria."""
+    for kind, effect in (("dropper_lengths", "dropper_lengths"), ("contact_wire_height",) * 2):
+        off = tiny().assigned([(f"effects.{effect}", False, "in the test")])
+        says = f"errors.0 would change nothing: effects.{effect} in the test is false"
+        with pytest.raises(InputError, match=says):
+            make_plan(off, task_of({**DROPPERS, "kind": kind}))
+    off = tiny().assigned([("effects.dropper_lengths", False, "in the test")])
+    samples = {"dropper_lengths_mm": 5.0, "seeds": [1]}
+    with pytest.raises(InputError, match="set.errors would change nothing: effects.dropper_len"):
+        make_plan(off, task_of(SPEED, set={**FORWARD, "errors": samples}))
+
+
 def test_a_train_of_a_set_keeps_its_speed() -> None:
     trains = {"slow": ["train.speed_km_h=200"]}
     task = task_of(DROPPERS, set={**FORWARD, "trains": trains, "speeds_km_h": [250.0]})

@@ -26,6 +26,7 @@ from catenary.cases.studies.sampling.tables import SamplingTable, field_column
 from catenary.cases.studies.sweep.variants import (
     Variant,
     is_number,
+    refuse_idle,
     share_a_value,
     text_of,
 )
@@ -49,12 +50,15 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
     ------
     InputError
         If a key has no value of its own that stands for a missing mean, or takes no field, or if a
-        key sets another one again.
+        key sets another one again or changes nothing.
     """
     cube = points(sampling)
     where = f"in {file}"
     own = resolved(scene)
     _refuse_lost(sampling, own, where)
+    if not any(key.startswith("effects.") for key in sampling.keys):
+        for key in (*sampling.keys, *sampling.fields):
+            refuse_idle(key, scene, f"{key} {where}")
     columns: dict[str, list[str]] = {}  # of the table
     assigned: list[list[str]] = []  # a list of assignments for each key of the scene
     lists: dict[str, dict[int, list[str]]] = {}  # entries that vary, by the keys of their lists

@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
@@ -18,6 +18,9 @@ from catenary.cases.scene.input.toml_input import parse_assignment, read_toml
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import known_keys, list_of, names_value
 from catenary.postproc.files.csv_text import begins_formula
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
 
 MAX_VARIANTS = 10_000
 MOST_LETTERS = 200  # in a variant's name
@@ -165,6 +168,29 @@ def share_a_value(key: str, other: str) -> bool:
     """Whether two dotted keys are the same, or one of them stands within the other."""
     shorter, longer = sorted((_parts(key), _parts(other)), key=len)
     return longer[: len(shorter)] == shorter
+
+
+def refuse_idle(key: str, scene: Scene, where: str) -> None:
+    """Refuse to vary an irregularity of a scene whose effect is switched off.
+
+    Parameters
+    ----------
+    key : dotted, of any kind
+    scene : as it stands
+    where : the place that names the key, with which the sentence begins
+
+    Raises
+    ------
+    InputError
+        If the effect is off, so that all values of the key are the same scene.
+    """
+    table, _, rest = key.partition(".")
+    effect = rest.partition(".")[0]
+    if table == "irregularities" and not scene.effects.get(effect, True):
+        raise InputError(
+            f"{where} would change nothing: effects.{effect} "
+            f"{scene.origin.of(f'effects.{effect}')} is false"
+        )
 
 
 def sets_again(later: str, earlier: str) -> bool:

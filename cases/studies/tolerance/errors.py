@@ -15,7 +15,7 @@ from catenary.cases.scene.keys.keys import list_of
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.sweep.variants import check_key, is_number, share_a_value
+from catenary.cases.studies.sweep.variants import check_key, is_number, refuse_idle, share_a_value
 from catenary.cases.studies.tolerance.task import (
     DropperErrors,
     ErrorKind,
@@ -96,9 +96,12 @@ def groups_of(tables: Sequence[ErrorKind], scene: Scene) -> list[Group]:
     Raises
     ------
     InputError
-        If the line has nothing that an error is of, or heights of its own.
+        If the line has nothing that an error is of, or heights of its own, or if errors of a kind
+        are switched off.
     """
     groups = [_group(table, scene, f"errors.{number}") for number, table in enumerate(tables)]
+    for number, group in enumerate(groups):
+        refuse_idle(group.key, scene, f"errors.{number}")
     for (i, earlier), (j, later) in combinations(enumerate(groups), 2):
         if not share_a_value(earlier.key, later.key):
             continue
