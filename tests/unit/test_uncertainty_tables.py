@@ -89,6 +89,18 @@ def test_chosen_values_have_shares_and_no_probabilities() -> None:
     assert "robability" not in chosen and "NOTE        no sampling is known: means, " in chosen
 
 
+def test_a_run_that_broke_is_told_to_be_left_out_of_probabilities() -> None:
+    rows = table_of(some(range(1, 31))).records()
+    for row in rows[:2]:  # both pantographs of the first run
+        row |= {"outcome": "the line fell", "std_N": None}
+    found = evaluate(run_table(rows, sampling_of(SAMPLE, "s.toml")))
+    assert {row["n"] for row in found.probabilities} == {29}
+    assert found.notes[0] == (
+        "1 run of 30 did not end; estimates are of the others, and no probability counts a run "
+        "that broke as failed"
+    )
+
+
 def test_what_any_pantograph_fails_is_failed() -> None:
     """Tables from elsewhere may give each pantograph its own criteria: of four runs the leading one
     fails in one, the trailing one in three, of which one is the same."""

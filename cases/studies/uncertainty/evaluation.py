@@ -78,9 +78,11 @@ def evaluate(table: RunTable) -> Uncertainty:
     runs = table.runs
     n_done = int((runs["outcome"] == DONE).sum())
     method, sensitivity, notes = indices(table)
+    probabilities = failing(independent)
     if n_done < len(runs):
         broken = counted(len(runs) - n_done, "run")
         others = "; estimates are of the others" if statistics else ""
+        others += ", and no probability counts a run that broke as failed" if probabilities else ""
         notes.insert(0, f"{broken} of {len(runs)} did not end{others}")
     if not statistics:
         notes.insert(0, "there are no estimates, which take figures of at least two runs")
@@ -90,7 +92,6 @@ def evaluate(table: RunTable) -> Uncertainty:
             "no sampling is known: means, quantiles and shares are those of these runs, and bounds "
             "hold if their inputs are independent samples"
         )
-    probabilities = failing(independent)
     return Uncertainty(
         len(runs), n_done, statistics, quantiles, probabilities, method, sensitivity,
         _remarks(runs), notes, is_sampled,
