@@ -101,7 +101,6 @@ def test_nothing_but_tables_is_left_and_the_same_call_goes_on(
     assert records[1].stat().st_mtime_ns == kept_time
 
 
-@pytest.mark.study
 def test_the_table_of_another_scene_or_other_samples_stays(
     scene: catenary.Scene, tmp_path: Path
 ) -> None:
@@ -125,6 +124,7 @@ def test_the_table_of_another_scene_or_other_samples_stays(
     assert (swept(stiffer, 1, force=True).std_N != first.std_N).all()
 
 
+@pytest.mark.study
 @pytest.mark.process
 def test_pieces_of_work_in_processes_give_the_same(
     scene: catenary.Scene, table: pd.DataFrame
