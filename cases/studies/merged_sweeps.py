@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.histories import FILE as HISTORIES
 from catenary.cases.studies.sweep.histories import merge_histories
 from catenary.cases.studies.sweep.output import RECORD, table_files
+from catenary.cases.studies.sweep.same_scene import other_value
 from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import Uncertainty
 from catenary.cases.studies.uncertainty.run_table import read_sampling_beside
@@ -23,8 +24,6 @@ from catenary.postproc.report.study_table import Column, StudyTable, write_files
 _DONE = "done"
 # Figures that differ between two runs of the same variant.
 _OWN = ("wall_s", "remarks")
-# Tables of a case that its figures do not depend on.
-_IDLE = ("case", "output", "test")
 
 
 class Merged(NamedTuple):
@@ -146,29 +145,12 @@ def _refuse_other_scene(
     """Refuse sweeps whose variants differ from other values, if their records have these."""
     if record["scene"] is None or first["scene"] is None:
         return
-    for key, one, two in _differences(first["scene"], record["scene"]):
-        varied = any(f"{key}.".startswith(f"{own}.") for own in first["varied"])
-        # Files may stand in other folders of other machines.
-        elsewhere = key.endswith("file") and Path(str(one)).name == Path(str(two)).name
-        if key.split(".")[0] not in _IDLE and not varied and not elsewhere:
-            raise InputError(
-                f"{folder} cannot join {of}: {key} is {shown(two)} there, and {shown(one)} here"
-            )
-
-
-def _differences(one: Any, two: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Keys of tables, and of lists of one length, with the values in which they differ."""
-    pairs: list[tuple[str, Any, Any]]
-    if isinstance(one, dict) and isinstance(two, dict):
-        pairs = [(name, one.get(name), two.get(name)) for name in dict.fromkeys([*one, *two])]
-    elif isinstance(one, list) and isinstance(two, list) and len(one) == len(two):
-        pairs = [(str(i), a, b) for i, (a, b) in enumerate(zip(one, two, strict=True))]
-    else:
-        if one != two:
-            yield key, one, two
-        return
-    for name, a, b in pairs:
-        yield from _differences(a, b, f"{key}.{name}" if key else name)
+    other = other_value(first["scene"], record["scene"], first["varied"])
+    if other is not None:
+        key, one, two = other
+        raise InputError(
+            f"{folder} cannot join {of}: {key} is {shown(two)} there, and {shown(one)} here"
+        )
 
 
 def _endless(sampling: SamplingTable | None) -> SamplingTable | None:

@@ -23,6 +23,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import FORWARD, turned
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import OF_LINE, STATISTICS, statistics_of
+from catenary.cases.studies.sweep.variants import refuse_idle, sets_again, share_a_value
 
 if TYPE_CHECKING:
     from catenary.cases.studies.ensemble import Marches
@@ -153,7 +154,7 @@ def members_of(table: SetTable) -> list[Member]:
     Raises
     ------
     InputError
-        If there are more than ``MOST_SCENES``, or an assignment of a train is none.
+        If there are more than ``MOST_SCENES``, or an assignment of a train is none, or is lost.
     """
     trains = {
         name: [parse_assignment(text, f"train {name}:") for text in texts]
@@ -185,6 +186,13 @@ def _member(
         assert table.errors is not None
         values.append((f"{_LENGTHS}.standard_deviation_mm", table.errors.dropper_lengths_mm))
         values.append((f"{_LENGTHS}.seed", seed))
+    for later, _ in values[len(of_train) :]:
+        for earlier, _ in of_train:
+            if sets_again(later, earlier):
+                raise InputError(
+                    f"train {train} of the set gives {earlier}, and the set {later}, by which the "
+                    "former would be lost; leave one of them out"
+                )
     return Member(direction, speed, train, seed, tuple(values))
 
 
@@ -219,14 +227,39 @@ class SceneSet:
         Raises
         ------
         InputError
-            With the name of the member whose scene is wrong.
+            With the name of the member whose scene is wrong, or has no errors of dropper lengths.
         """
         for member in self.members:
             try:
-                self.scene(member)
+                scene = self.scene(member)
+                if member.seed is not None:
+                    refuse_idle(_LENGTHS, scene, "set.errors")
             except InputError as error:
                 raise InputError(f"scene {member.name}: {error}") from error
         return self
+
+
+def refuse_shared(members: Sequence[Member], key: str, where: str) -> None:
+    """Refuse a key that a study varies and a set gives as well: the set's value would be lost.
+
+    Parameters
+    ----------
+    members : of the set
+    key : dotted key that is varied
+    where : the place in the task that names it
+
+    Raises
+    ------
+    InputError
+        If a member has a value of its own there, above or below.
+    """
+    for member in members:
+        for given, _ in member.values:
+            if share_a_value(given, key):
+                raise InputError(
+                    f"{where} varies {key}, but the scene {member.name} of the set has its own "
+                    f"{given}, which would be lost; leave one of them out"
+                )
 
 
 BROKE = "broke"

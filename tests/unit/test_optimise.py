@@ -21,6 +21,7 @@ from catenary.cases.studies import scene_sets
 from catenary.cases.studies.optimise import output, study
 from catenary.cases.studies.optimise.checks import (
     AS_IS,
+    UNSEEN,
     Row,
     change,
     not_improved,
@@ -332,6 +333,37 @@ def test_bounds_of_values_are_bounds_of_changes() -> None:
 def test_variables_that_a_case_has_not_are_refused(table: dict[str, Any], says: str) -> None:
     with pytest.raises(InputError, match=says):
         variables(**table)
+
+
+def test_errors_that_are_switched_off_are_no_check() -> None:
+    """Lines of other seeds would be one line."""
+    task = task_of(checks={"n_seeds": 2})
+    off = draft(**{"effects.dropper_lengths": False})
+    assert set(study.make_plan(draft(), task).checks) - set(study.make_plan(off, task).checks) == {
+        UNSEEN
+    }
+
+
+@pytest.mark.parametrize(
+    ("tables", "says"),
+    [
+        (
+            {"variables": [{"key": key, "change": [-1.0, 1.0]} for key in (HEAD, f"{HEAD}.0")]},
+            f"variables.1.key is {HEAD}.0, which is varied twice, also by {HEAD}",
+        ),
+        (
+            {"set": {"trains": {"single": [f"{HEAD}=[7.0, 15.0]"]}}},
+            f"variables.0 varies {HEAD}, but the scene forward, single of the set has its own",
+        ),
+        (
+            {"search": {"values": [f"{HEAD}=[7.0, 15.0]"]}},
+            f"search.values give {HEAD}, which variables.0 vary",
+        ),
+    ],
+)
+def test_a_key_that_is_set_again_is_refused(tables: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        study.make_plan(draft(), task_of(**tables))
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from catenary.cases.studies.sweep.variants import Variant
 CASE = "en50318_2002"
 FILE = "uncertain.toml"
 SPEED, TENSION = "train.speed_km_h", "line.contact_wire.tension_N"
+MASSES = "pantographs.reference.masses_kg"
 LENGTHS = "irregularities.dropper_lengths.by_dropper"
 HEIGHTS = "irregularities.contact_wire_height.by_place"
 
@@ -378,6 +379,19 @@ UNFIT: list[tuple[dict[str, Any], str]] = [
         {"fields": {LENGTHS: FIELD}, "keys": {"line.n_spans": {"type": "choices", "values": [9]}}},
         "cannot stand beside line.n_spans",
     ),
+    (
+        {
+            "keys": {
+                MASSES: {"type": "choices", "values": [[7, 15], [8, 15]]},
+                f"{MASSES}.1": {**FIELD, "mean": 15.0},
+            }
+        },
+        "masses_kg.1 in uncertain.toml sets the value of pantographs.reference.masses_kg again",
+    ),
+    (
+        {"keys": {"line.stagger_m.0": FIELD}, "fields": {"line.stagger_m": FIELD}},
+        "line.stagger_m in uncertain.toml sets the value of line.stagger_m.0 again",
+    ),
     ({"fields": {"defects": FIELD}}, 'cannot be of type normal; "chance" is for defects'),
     ({"fields": {LENGTHS: {**FIELD, "at": "supports"}}}, "for courses along the line"),
     (
@@ -422,3 +436,13 @@ def test_keys_are_nested_or_dotted(tmp_path: Path) -> None:
     assert read_sampling(nested) == read_sampling(dotted)
     with pytest.raises(InputError, match="cannot be read"):
         read_sampling(tmp_path / "nowhere.toml")
+
+
+def test_fields_that_are_switched_off_are_refused() -> None:
+    off = load_scene(CASE, ["effects.dropper_lengths=false"])
+    field = {LENGTHS: FIELD}
+    says = f"{LENGTHS} in uncertain.toml would change nothing: effects.dropper_lengths"
+    with pytest.raises(InputError, match=says):
+        drawn(off, n=4, fields=field)
+    effect = {"effects.dropper_lengths": {"type": "choices", "values": [True, False]}}
+    assert len(drawn(off, n=4, keys=effect, fields=field)) == 4

@@ -374,3 +374,14 @@ def test_the_verb_writes_its_table_once(tmp_path: Path) -> None:
     again = invoke(*words)
     assert again.exit_code == 2 and "is there already" in again.output
     assert invoke(*words, "--force").exit_code == 0
+
+
+def test_what_moves_the_train_along_the_track_is_doubted() -> None:
+    """A march of n steps at v ends a step farther if it runs by v/n faster, or begins there."""
+    keys = ["train.speed_km_h", "train.start_m", KEYS[1]]
+    found = sensitivity_of(load_scene(CASE, TINY), keys, MPI.COMM_SELF)
+    text = as_text(found)
+    # 1152 steps of 2 ms at 250 km/h: 0.22 km/h and 0.14 m.
+    assert "\ntrain.speed_km_h moves some of these already by 0.2 km/h: larger" in text
+    assert "\ntrain.start_m moves some of these already by 0.1 m: larger" in text
+    assert "moves some" not in as_text(tiny())

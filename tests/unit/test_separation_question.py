@@ -134,6 +134,17 @@ def test_a_period_that_chance_explains_is_none() -> None:
     assert "No period from 10 to 30 m, which these distances can show" in as_text(study, none)
 
 
+def test_a_smooth_curve_without_a_period_has_none() -> None:
+    """Deviations at neighbouring distances are alike: a line, and sums of waves of all lengths
+    above some 40 m, whose power has no peak."""
+    d, rng = np.linspace(31.0, 400.0, 42), np.random.default_rng(4)
+    assert np.isnan(period_of(d, 50.0 - 0.02 * d, theory(), SPAN).fitted)
+    alike = np.linalg.cholesky(np.exp(-(((d[:, None] - d) / 20.0) ** 2)) + 1e-9 * np.eye(d.size))
+    curves = [40.0 + 8.0 * alike @ rng.normal(size=d.size) for _ in range(20)]
+    found = [period_of(d, one, theory(), SPAN).fitted for one in curves]
+    assert np.count_nonzero(np.isfinite(found)) <= 4
+
+
 @pytest.mark.study
 def test_the_command_agrees_with_runs_by_hand(tmp_path: Path) -> None:
     """300 m is refused there: the leading one would start in the evaluated stretch."""

@@ -101,6 +101,29 @@ def test_nothing_but_tables_is_left_and_the_same_call_goes_on(
     assert records[1].stat().st_mtime_ns == kept_time
 
 
+def test_the_table_of_another_scene_or_other_samples_stays(
+    scene: catenary.Scene, tmp_path: Path
+) -> None:
+    """Names of variants are the same, their figures would be others."""
+    key, out = "train.speed_km_h", tmp_path / "out"
+
+    def swept(of: catenary.Scene, seed: int, **more: Any) -> pd.DataFrame:
+        normal = {"type": "normal", "mean": 250.0, "standard_deviation": 5.0}
+        sample = {"n": 2, "seed": seed, "method": "random", "keys": {key: normal}}
+        return catenary.sweep(of, sample=sample, out=out, only_statistics=True, **more)
+
+    first = swept(scene, 1)
+    with pytest.raises(InputError, match="is the table of a sweep with another sample_000001; "):
+        swept(scene, 2)
+    stiffer = scene.replace({"contact.stiffness_N_per_m": 60000.0})
+    says = "of a sweep with contact.stiffness_N_per_m = 50000.0, here it is 60000.0; name another"
+    with pytest.raises(InputError, match=says):
+        swept(stiffer, 1)
+    # What is recorded, and a value that all variants set, change no figure.
+    same(swept(scene.replace({"output.field_every_s": 0.0, key: 240.0}), 1), first)
+    assert (swept(stiffer, 1, force=True).std_N != first.std_N).all()
+
+
 @pytest.mark.study
 @pytest.mark.process
 def test_pieces_of_work_in_processes_give_the_same(

@@ -105,6 +105,69 @@ def test_tensions_are_wrong_by_shares() -> None:
     assert heavier.pantographs["reference"].masses_kg == [7.2, 15.5]
 
 
+def test_entries_of_one_list_are_wrong_together(evaluated: Any) -> None:
+    """By hand: masses of 7.2 and 15 kg, to each of which all together add an error of its own."""
+    head = {**SPEED, "name": "head", "key": "pantographs.reference.masses_kg.0", "level": 0.5}
+    frame = {**head, "name": "frame", "key": "pantographs.reference.masses_kg", "entry": 2}
+    groups = groups_of(task_of(head, frame).errors, tiny().scene())
+    values: dict[str, Any] = {}
+    for group, error in zip(groups, (0.5, -1.0), strict=True):
+        values |= group.values(np.array([error]), values)
+    assert values == {"pantographs.reference.masses_kg": [7.7, 14.0]}
+
+    def by_masses(scene: Scene) -> float:
+        first, second = scene.pantographs["reference"].masses_kg
+        return 29.5 + abs(first - 7.2) + abs(second - 15.0)
+
+    evaluated(by_masses)
+    errors = [{**own, "most": 0.5} for own in (head, frame)]
+    samples = {"worst_case": False, "probability": 0.9, "confidence": 0.5, "resolution": 0.01}
+    plan = make_plan(tiny(), task_of(*errors, samples=samples))
+    alone, _, together = find_tolerances(plan)
+    # Alone an error of 0.5 kg just keeps the bound of 30 N; two of 0.5 kg each do not.
+    assert alone.at_most and not together.at_most
+
+
+@pytest.mark.parametrize(
+    ("of_set", "error", "says"),
+    [
+        ({"speeds_km_h": [200.0, 250.0]}, SPEED, "errors.0 varies train.speed_km_h, but the scene"),
+        (
+            {"trains": {"single": ["pantographs.reference.masses_kg=[7.0, 15.0]"]}},
+            {**SPEED, "key": "pantographs.reference.masses_kg", "entry": 1},
+            "has its own pantographs.reference.masses_kg, which would be lost",
+        ),
+    ],
+)
+def test_errors_of_what_the_set_gives_are_refused(
+    of_set: dict[str, Any], error: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(InputError, match=says):
+        make_plan(tiny(), task_of(error, set={**FORWARD, **of_set}))
+
+
+def test_errors_that_are_switched_off_have_no_tolerance() -> None:
+    """Any length of a dropper would keep all criteria."""
+    for kind, effect in (("dropper_lengths", "dropper_lengths"), ("contact_wire_height",) * 2):
+        off = tiny().assigned([(f"effects.{effect}", False, "in the test")])
+        says = f"errors.0 would change nothing: effects.{effect} in the test is false"
+        with pytest.raises(InputError, match=says):
+            make_plan(off, task_of({**DROPPERS, "kind": kind}))
+    off = tiny().assigned([("effects.dropper_lengths", False, "in the test")])
+    samples = {"dropper_lengths_mm": 5.0, "seeds": [1]}
+    with pytest.raises(InputError, match="set.errors would change nothing: effects.dropper_len"):
+        make_plan(off, task_of(SPEED, set={**FORWARD, "errors": samples}))
+
+
+def test_a_train_of_a_set_keeps_its_speed() -> None:
+    trains = {"slow": ["train.speed_km_h=200"]}
+    task = task_of(DROPPERS, set={**FORWARD, "trains": trains, "speeds_km_h": [250.0]})
+    with pytest.raises(InputError, match="^train slow of the set gives train.speed_km_h, and the"):
+        make_plan(tiny(), task)
+    plan = make_plan(tiny(), task_of(DROPPERS, set={**FORWARD, "trains": trains}))
+    assert plan.scenes.scene(plan.scenes.members[0]).train.speed_km_h == 200.0
+
+
 @pytest.mark.parametrize("distribution", ["uniform", "normal"])
 def test_errors_stay_within_their_tolerance(distribution: str) -> None:
     group = group_of({**DROPPERS, "distribution": distribution}, tiny().scene())
@@ -414,6 +477,13 @@ def test_an_installer_reads_which_criteria_nothing_helps_and_which_nothing_loses
     [
         ([SPEED, {**SPEED, "name": "again"}], "as errors.0 are; give one of them"),
         ([SPEED, {**TENSION, "name": "speed"}], "a name of its own"),
+        (
+            [
+                {**SPEED, "key": "pantographs.reference.masses_kg.1"},
+                {**SPEED, "name": "b", "key": "pantographs.reference.masses_kg", "entry": 2},
+            ],
+            "errors.1 are of pantographs.reference.masses_kg 2, as errors.0 are",
+        ),
         ([{**SPEED, "key": "line.topology"}], "no number"),
         ([{**SPEED, "key": "pantographs.reference.masses_kg"}], "errors.0.entry names one"),
         ([{**SPEED, "level": -1.0}], "^errors.0.level is -1.0 in"),
@@ -445,8 +515,7 @@ def test_the_verb_writes_what_it_says(
         '[[criteria]]\nstatistic = "std_N"\nat_most = 30.0\n[samples]\nprobability = 0.85\n'
     )
     words = ["tolerance", "en50318_2002", str(file), "-o", str(tmp_path / "out")]
-    for key, value in TINY.items():
-        words += ["--set", f"{key}={value}"]
+    words += ["--set", *(f"{key}={value}" for key, value in TINY.items())]
     done = invoke(*words)
     assert done.exit_code == 0, done.output
     assert "speed +-40 km/h: 19 of 19 lines run, " in done.output

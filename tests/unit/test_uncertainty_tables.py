@@ -80,6 +80,43 @@ def test_what_has_no_estimates_says_so() -> None:
     assert notes[0] == "a without an index: no two runs differ in it" and none not in notes
 
 
+def test_chosen_values_have_shares_and_no_probabilities() -> None:
+    runs = table_of(some(range(1, 31))).records()
+    sampled = output.as_text(evaluate(run_table(runs, sampling_of(SAMPLE, "s.toml"))))
+    chosen = output.as_text(evaluate(run_table(runs)))
+    assert "Probability that a criterion fails, with" in sampled and "no sampling" not in sampled
+    assert "Share of the runs in which a criterion fails, with" in chosen
+    assert "robability" not in chosen and "NOTE        no sampling is known: means, " in chosen
+
+
+def test_a_run_that_broke_is_told_to_be_left_out_of_probabilities() -> None:
+    rows = table_of(some(range(1, 31))).records()
+    for row in rows[:2]:  # both pantographs of the first run
+        row |= {"outcome": "the line fell", "std_N": None}
+    found = evaluate(run_table(rows, sampling_of(SAMPLE, "s.toml")))
+    assert {row["n"] for row in found.probabilities} == {29}
+    assert found.notes[0] == (
+        "1 run of 30 did not end; estimates are of the others, and no probability counts a run "
+        "that broke as failed"
+    )
+
+
+def test_what_any_pantograph_fails_is_failed() -> None:
+    """Tables from elsewhere may give each pantograph its own criteria: of four runs the leading one
+    fails in one, the trailing one in three, of which one is the same."""
+    failed = {"leading": (1,), "trailing": (1, 2, 3)}
+    rows = [
+        {"variant": i, "pantograph": one, "std_N": 20.0 + i, "judged": "least force",
+         "failed": "least force" if i in own else ""}
+        for i in range(1, 5) for one, own in failed.items()
+    ]  # fmt: skip
+    for columns in (("failed", "judged"), ("failed",)):
+        left = {"failed", "judged"} - {*columns}
+        table = run_table([{k: v for k, v in row.items() if k not in left} for row in rows])
+        of_one, of_any = evaluate(table).probabilities
+        assert (of_one["failed"], of_one["n"]) == (of_any["failed"], of_any["n"]) == (3, 4)
+
+
 def test_files_of_all_kinds_give_the_same_table(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     runs = some(range(1, 31))

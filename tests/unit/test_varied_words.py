@@ -12,6 +12,7 @@ from catenary.cases.cli.varied_words import each_varied
 
 CASE = "en50318_2002"
 SPEEDS, LAWS = "train.speed_km_h=200,250", "contact.stiffness_N_per_m=2e4,5e4"
+MASSES = "pantographs.reference.masses_kg"
 STEP = "numerics.dt_s=0.004"
 
 
@@ -71,6 +72,10 @@ def test_submitted_sweeps_vary_them_too(tmp_path: Path) -> None:
         (["--vary", SPEEDS, "contact.stifness_N_per_m=2e4,5e4"], "line (--vary) is unknown"),
         (["--vary", SPEEDS, "contact.stiffness_N_per_m=2e4,"], '--vary "contact.stiffness_N_per'),
         (["--vary", SPEEDS, SPEEDS], "--vary train.speed_km_h is given twice"),
+        (
+            ["--vary", f"{MASSES}.1=15,16", f"{MASSES}=[7,15],[8,15]"],
+            f"--vary {MASSES} sets {MASSES}.1 again",
+        ),
         (["--vary", SPEEDS, "--set", LAWS], "on the command line (--set)"),
     ],
 )
@@ -95,3 +100,16 @@ def test_options_in_a_wrong_place_are_told_where_they_belong(
     done = invoke(*words.replace("CASE", CASE).split())
     assert done.exit_code == 2 and says in done.output, done.output
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_variant_keeps_what_it_sets(tmp_path: Path) -> None:
+    """A key that a variant sets and that varies, too, would be lost; a part of it is set behind."""
+    (tmp_path / "variants.toml").write_text(f'light = ["{MASSES}=[6.0, 15.0]"]\n')
+    words = ["sweep", CASE, "--short", "-o", str(tmp_path / "out"), "--only-statistics"]
+    words += ["--variants", str(tmp_path / "variants.toml"), "--vary"]
+    refused = invoke(*words, f"{MASSES}=[7,15],[8,15]")
+    assert refused.exit_code == 2
+    assert f"--vary {MASSES} sets the {MASSES} of variant light again" in refused.output
+    done = invoke(*words, f"{MASSES}.1=14,16")
+    assert done.exit_code == 0, done.output
+    assert pd.read_csv(tmp_path / "out" / "sweep.csv").std_N.nunique() == 2

@@ -91,13 +91,16 @@ def test_a_quantile_that_few_values_leave_open_has_no_bound() -> None:
     assert quantile(x, 0.95).high == x.max()
 
 
-@pytest.mark.parametrize(
-    ("n", "short"), [pytest.param(60, 0.02, marks=pytest.mark.study), (1200, 0.0)]
-)
-def test_bounds_of_mean_and_deviation_cover_them(n: int, short: float) -> None:
-    """Of normal values: bootstrap up to 1000 values, Student's and the normal limit beyond."""
+@pytest.mark.parametrize("n", [10, pytest.param(60, marks=pytest.mark.study), 1200])
+def test_bounds_of_mean_and_deviation_cover_them(n: int) -> None:
+    """Of normal values: the mean by bootstrap up to 1000 values, by Student's distribution beyond.
+
+    Plain bootstrap bounds of ten values hold the mean in 87 % of the repetitions and the deviation
+    in 85 %. Those of the mean with the level of Hesterberg (2015) are short by 2 % or so, Bonett's
+    of the deviation (2006, table 1) by less than 1 %.
+    """
     rng = np.random.default_rng(6)
-    repetitions = 200
+    repetitions = 400
     of_mean = of_deviation = 0
     for _ in range(repetitions):
         x = rng.normal(50.0, 4.0, n)
@@ -105,11 +108,17 @@ def test_bounds_of_mean_and_deviation_cover_them(n: int, short: float) -> None:
         found = deviation(x)
         of_deviation += found.low <= 4.0 <= found.high
     error = math.sqrt(0.95 * 0.05 / repetitions)
-    check("coverage of the mean", of_mean / repetitions, 0.95, within=3 * error + short / 2)
-    # Bootstrap intervals of a variance are short at n = 60: by 1 to 3 % (Efron and Tibshirani 1993,
-    # table 14.2 has 4 to 6 % at n = 26).
-    check("coverage of the deviation", of_deviation / repetitions, 0.95 - short / 2,
-          within=3 * error + short / 2)  # fmt: skip
+    check("coverage of the mean", of_mean / repetitions, 0.94 if n == 10 else 0.95,
+          within=3 * error)  # fmt: skip
+    check("coverage of the deviation", of_deviation / repetitions, 0.95, within=3 * error)
+
+
+def test_bounds_of_a_deviation_cover_that_of_a_skewed_quantity() -> None:
+    """Of 40 exponential values, whose deviation is 1: Bonett (2006) finds 90 % where a bootstrap
+    holds it in 84 %."""
+    x = np.random.default_rng(8).exponential(1.0, (1000, 40))
+    hits = sum(one.low <= 1.0 <= one.high for one in map(deviation, x))
+    assert hits > 870
 
 
 def test_bounds_of_a_mean_stay_where_its_values_can_be() -> None:
@@ -226,3 +235,26 @@ def test_runs_that_broke_take_their_base_samples_with_them() -> None:
     rows = {row["key"]: row for row in found.sensitivity}
     for key, s1 in zip(KEYS, first, strict=True):
         check(f"S1 of {key}", rows[key]["S1"], s1, within=0.08)
+
+
+def test_indices_of_correlated_keys_hold_what_these_share() -> None:
+    """By hand: of z1 + 2 z2 + z3 with cov(z1, z2) = r the variance is 6 + 4 r, of which the means
+    under z1, z2 and z3 have (1 + 2 r)^2, (2 + r)^2 and 1: together more than all."""
+    normal = {"type": "normal", "mean": 0.0, "standard_deviation": 1.0}
+    raw = {
+        "n": 4000,
+        "keys": dict.fromkeys(KEYS, normal),
+        "correlations": [{"keys": [*KEYS[:2]], "rank": 0.6}],
+    }
+    sampling = sampling_of(raw, "sum.toml")
+    rows: list[dict[str, Any]] = []
+    for one in samples(sampling, load_scene("en50318_2002"), "sum.toml"):
+        z = [float(one.varied[key]) for key in KEYS]
+        rows.append({"variant": one.name, **dict(zip(KEYS, z, strict=True)), "outcome": "done",
+                     "std_N": z[0] + 2.0 * z[1] + z[2]})  # fmt: skip
+    found = evaluate(run_table(rows, sampling))
+    r = 2.0 * math.sin(math.pi * 0.6 / 6.0)
+    parts = ((1.0 + 2.0 * r) ** 2, (2.0 + r) ** 2, 1.0)
+    for row, part in zip(found.sensitivity, parts, strict=True):
+        check(f"S1 of {row['key']}", row["S1"], part / (6.0 + 4.0 * r), within=0.05)
+    assert found.notes == [f"the indices of {KEYS[0]} and {KEYS[1]} also hold what these share"]

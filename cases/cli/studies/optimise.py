@@ -13,6 +13,7 @@ from catenary.cases.cli.app import (
     Case,
     Force,
     Jobs,
+    MoreAssignments,
     Out,
     SceneWords,
     print_findings,
@@ -36,6 +37,7 @@ class TaskWords:
         Path, typer.Argument(metavar="FILE", help="TOML file with the task.", show_default=False)
     ]
     out: Out
+    extras: MoreAssignments = None
     assignments: Assignments = None
     n_jobs: Jobs = 1
     force: Force = False
@@ -43,8 +45,11 @@ class TaskWords:
     def make(self, verb: str, study: Callable[..., Made]) -> int:
         """Make the study and print what it found. Serial."""
 
+        from catenary.cases.scene.load import read_draft
+
         def read() -> tuple[Draft, Path]:
-            return SceneWords(self.case, assignments=self.assignments).draft()[0], self.task_file
+            words = SceneWords(self.case, self.extras, self.assignments)
+            return read_draft(words.case, words.changes), self.task_file
 
         made = study(
             read,

@@ -70,7 +70,8 @@ def checks_of(draft: Draft, task: OptimiseTask) -> dict[str, SceneSet]:
     }
     members = _possible(draft, members_of(both), task)
     found = {name: SceneSet(draft.assigned(values), members) for name, values in numerics.items()}
-    if task.checks.n_seeds and line_of(scene).dropper_x.size:
+    has_errors = line_of(scene).dropper_x.size and scene.effects.get("dropper_lengths", True)
+    if task.checks.n_seeds and has_errors:
         unseen = both.model_copy(update={"errors": _unseen(task)})
         samples = [one for one in members_of(unseen) if one.seed is not None]
         found[UNSEEN] = SceneSet(draft, _possible(draft, samples, task))

@@ -28,7 +28,8 @@ from catenary.cases.studies.optimise.search import search
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.optimise.variables import Variables, variables_of
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.scene_sets import Evaluation, SceneSet, members_of
+from catenary.cases.studies.scene_sets import Evaluation, SceneSet, members_of, refuse_shared
+from catenary.cases.studies.sweep.variants import share_a_value
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.report.study_table import StudyTable
 
@@ -122,10 +123,17 @@ def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
     """
     whole = draft.scene()
     searched = _shortened(draft) if task.search.short else draft
-    own = (parse_assignment(text, "search.values:") for text in task.search.values)
+    own = [parse_assignment(text, "search.values:") for text in task.search.values]
     searched = searched.assigned((key, value, "in search.values") for key, value in own)
     scenes = _of_any_values(SceneSet(searched, members_of(task.set)).checked())
     variables = variables_of(task.variables, whole)
+    for number, table in enumerate(task.variables):
+        refuse_shared(scenes.members, table.key, f"variables.{number}")
+        for key, _ in own:
+            if share_a_value(key, table.key):
+                raise InputError(
+                    f"search.values give {key}, which variables.{number} vary; leave it out"
+                )
     checks = {name: _of_any_values(own) for name, own in checks_of(draft, task).items()}
     warnings = []
     if task.search.short:

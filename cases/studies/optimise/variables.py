@@ -14,7 +14,7 @@ from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.optimise.task import VariableTable
-from catenary.cases.studies.sweep.variants import check_key, is_number
+from catenary.cases.studies.sweep.variants import check_key, is_number, share_a_value
 
 # Keys whose entries are places along a span: of two that are symmetric one moves against the other.
 _PLACES = "positions_m"
@@ -114,8 +114,10 @@ def variables_of(tables: Sequence[VariableTable], scene: Scene) -> Variables:
     tables_of_scene = resolved(scene)
     for number, table in enumerate(tables):
         where = f"variables.{number}.key"
-        if table.key in shipped:
-            raise InputError(f"{where} is {table.key}, which is varied twice; name it once")
+        for other in shipped:
+            if share_a_value(table.key, other):
+                by = "" if table.key == other else f", also by {other}"
+                raise InputError(f"{where} is {table.key}, which is varied twice{by}; name it once")
         value = _value(tables_of_scene, table.key, where)
         shipped[table.key] = value
         entries = _classes(table, len(value), number) if isinstance(value, list) else [()]

@@ -56,8 +56,9 @@ _OF_BOTH = (
 )
 _MOST_ROWS, _MOST_REMARKS = 40, 4  # on a terminal; files have all
 _LEAST_FOR_PERIOD = 12  # distances from which a period can be read
-# Curves with the deviations in another order, of which so many may be explained as well.
-_SHUFFLED, _AS_WELL = 99, 4
+# Curves without a period, of which so many may be explained as well.
+_RANDOM, _AS_WELL = 99, 4
+_MOST_ALIKE = 0.995  # correlation of neighbours, near which a curve has hardly any variance
 
 
 class Distances(NamedTuple):
@@ -194,7 +195,7 @@ class Period(NamedTuple):
     Attributes
     ----------
     fitted : period of a decaying wave fitted to the deviation of the trailing one
-    explains : share of its variance that the fit explains [-]
+    explains : share of its variance about a trend that the fit explains [-]
     ringing : (2,) v / f at the ends of the lowest pass band
     travel : L (c + v) / c
     tried : shortest and longest period that the distances can show
@@ -244,24 +245,55 @@ def period_of(d: np.ndarray, sigma: np.ndarray, theory: WaveTheory, span: float)
         return Period(np.nan, np.nan, ringing, travel)
     # Shorter ones than two distances cannot be seen, longer ones not be told from a trend.
     shortest, longest = 2.0 * float(np.median(np.diff(d))), 0.5 * float(np.ptp(d))
-    # A fit so free explains much of any few numbers: it has to explain more than of most curves
-    # with the same deviations in another order.
-    rng, off = np.random.default_rng(1), sigma - sigma.mean()
-    curves = np.stack([off, *(rng.permutation(off) for _ in range(_SHUFFLED))], axis=1)
-    most, fitted = np.zeros(_SHUFFLED + 1), np.nan
-    for period in np.linspace(shortest, longest, 400).tolist():
-        for reach in np.ptp(d) * np.array([0.25, 0.5, 1.0, 2.0, 10.0]):
-            fade, phase = np.exp(-d / reach), 2 * np.pi * d / period
-            basis = np.stack([np.ones_like(d), fade, fade * np.cos(phase), fade * np.sin(phase)], 1)
-            directions, sizes, _ = np.linalg.svd(basis, full_matrices=False)
-            found = ((directions[:, sizes > 1e-9 * sizes[0]].T @ curves) ** 2).sum(axis=0)
+    reaches = np.ptp(d) * np.array([0.25, 0.5, 1.0, 2.0, 10.0])
+    trends = [_orthonormal(np.ones_like(d), d, np.exp(-d / reach)) for reach in reaches]
+    # A fit so free explains much of any smooth curve: it has to explain more of what is off the
+    # trend than of most curves that are as smooth.
+    off = min((_without(trend, sigma) for trend in trends), key=np.linalg.norm)
+    curves = np.column_stack([sigma, _as_smooth(off)])
+    most, fitted = np.zeros(_RANDOM + 1), np.nan
+    for reach, trend in zip(reaches, trends, strict=True):
+        rest = _without(trend, curves)
+        # Of a curve that is all trend nothing is explained.
+        size = np.maximum((rest**2).sum(axis=0), 1e-12 * (curves**2).sum(axis=0))
+        for period in np.linspace(shortest, longest, 400).tolist():
+            wave = np.exp(-d / reach) * np.exp(2j * np.pi * d / period)
+            basis = _orthonormal(*_without(trend, np.column_stack([wave.real, wave.imag])).T)
+            found = ((basis.T @ rest) ** 2).sum(axis=0) / size
             if found[0] > most[0]:
                 fitted = period
             most = np.maximum(most, found)
     tried = shortest, longest
     if np.count_nonzero(most[1:] >= most[0]) > _AS_WELL:
         return Period(np.nan, np.nan, ringing, travel, tried)
-    return Period(fitted, float(most[0] / (off @ off)), ringing, travel, tried)
+    return Period(fitted, float(most[0]), ringing, travel, tried)
+
+
+def _orthonormal(*columns: np.ndarray) -> np.ndarray:
+    """Orthonormal columns that span given ones (n,), fewer if these depend on each other."""
+    directions, sizes, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
+    return np.asarray(directions[:, sizes > 1e-9 * sizes[0]])
+
+
+def _without(basis: np.ndarray, curves: np.ndarray) -> np.ndarray:
+    """Curves (n, ...) without their parts along the orthonormal columns of a basis."""
+    return np.asarray(curves - basis @ (basis.T @ curves))
+
+
+def _as_smooth(curve: np.ndarray) -> np.ndarray:
+    """Random curves (n, _RANDOM) whose neighbours are as alike as those of a curve (n,).
+
+    Autoregressive noise of the first order (M. Mann, J. Lees, Climatic Change 33, 1996, 409); the
+    correlation of neighbours is corrected for its bias (M. Kendall, Biometrika 41, 1954, 403).
+    """
+    from scipy.signal import lfilter
+
+    n, squares = curve.size, float(curve @ curve)
+    alike = float(curve[1:] @ curve[:-1]) / squares if squares else 0.0
+    alike = min(max(alike + (1.0 + 4.0 * alike) / n, 0.0), _MOST_ALIKE)
+    noise = np.random.default_rng(1).normal(size=(n, _RANDOM))
+    noise[0] /= np.sqrt(1.0 - alike**2)  # as far from the mean as all that follow
+    return np.asarray(lfilter([1.0], [1.0, -alike], noise, axis=0))
 
 
 def as_text(study: SeparationStudy, period: Period) -> str:
@@ -322,7 +354,7 @@ def _explained(period: Period) -> str:
         share = 100 * period.explains
         found = (
             f"A period of {period.fitted:.0f} m explains {share:.0f} % of the variance of the "
-            "trailing one's deviation"
+            "trailing one's deviation about its trend"
         )
     rings = f"spans ring once in {low:.0f} to {high:.0f} m, " if np.isfinite(low) else ""
     return f"{found}; {rings}waves from the leading one repeat every {period.travel:.0f} m."

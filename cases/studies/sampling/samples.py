@@ -23,7 +23,13 @@ from catenary.cases.studies.sampling.distributions import (
 )
 from catenary.cases.studies.sampling.fields import fields_as_text
 from catenary.cases.studies.sampling.tables import SamplingTable, field_column
-from catenary.cases.studies.sweep.variants import Variant, is_number, text_of
+from catenary.cases.studies.sweep.variants import (
+    Variant,
+    is_number,
+    refuse_idle,
+    share_a_value,
+    text_of,
+)
 
 
 def sample_name(number: int) -> str:
@@ -43,11 +49,16 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
     Raises
     ------
     InputError
-        If a key has no value of its own that stands for a missing mean, or takes no field.
+        If a key has no value of its own that stands for a missing mean, or takes no field, or if a
+        key sets another one again or changes nothing.
     """
     cube = points(sampling)
     where = f"in {file}"
     own = resolved(scene)
+    _refuse_lost(sampling, own, where)
+    if not any(key.startswith("effects.") for key in sampling.keys):
+        for key in (*sampling.keys, *sampling.fields):
+            refuse_idle(key, scene, f"{key} {where}")
     columns: dict[str, list[str]] = {}  # of the table
     assigned: list[list[str]] = []  # a list of assignments for each key of the scene
     lists: dict[str, dict[int, list[str]]] = {}  # entries that vary, by the keys of their lists
@@ -80,6 +91,24 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
             zip(zip(*assigned, strict=True), zip(*columns.values(), strict=True), strict=True), 1
         )
     ]
+
+
+def _refuse_lost(sampling: SamplingTable, own: dict[str, Any], where: str) -> None:
+    """Refuse a key whose value another one sets again, in a scene with the tables ``own``."""
+    keys = [*sampling.keys, *sampling.fields]
+    for number, later in enumerate(keys):
+        for earlier in keys[:number]:
+            if not share_a_value(earlier, later):
+                continue
+            # A part may be set after its table; an entry is set together with its list.
+            is_part = later.count(".") > earlier.count(".") and not _is_plain_list(
+                value_at(own, earlier)
+            )
+            if not is_part:
+                raise InputError(
+                    f"{later} {where} sets the value of {earlier} again, so that one of both would "
+                    "be lost; keep one of them"
+                )
 
 
 def _texts(

@@ -84,7 +84,7 @@ def as_text(found: Sensitivity) -> str:
         lines.append(f"largest uplift {found.max_uplift * _MM:.1f} mm")
     lines += ["", "Changes of these under a change of each parameter:", table_of(found).text(), ""]
     lines += _idle(found)
-    lines.append(_kinks(found))
+    lines += [_kinks(found), *_early(found)]
     for key, why in found.left_out.items():
         lines.append(f"{key} is left out: {why}")
     return "\n".join(lines)
@@ -106,5 +106,25 @@ def _kinks(found: Sensitivity) -> str:
     return (
         f"In {found.n_steps} steps contacts opened or closed {contacts} times and droppers or "
         f"other links switched {links} times. Derivatives hold while a change moves none of these "
-        "to another step; larger changes also add what the moved switches do."
+        "to another step, and those of least and largest values while these stay at their step and "
+        "arm; larger changes also add what the moved switches do."
     )
+
+
+def _early(found: Sensitivity) -> list[str]:
+    """Sentences on parameters that move the train along the track, and so all switches at once."""
+    sentences = []
+    for one in found.parameters:
+        # By so much the train is a step farther at the end of the march.
+        if one.key == "train.speed_km_h":
+            least = one.size / found.n_steps
+        elif one.key == "train.start_m":
+            least = found.step_m
+        else:
+            continue
+        sentences.append(
+            f"{one.key} moves some of these already by {least:.1g} {one.unit}: larger changes may "
+            "do something else than its derivative says, and even of the other sign. Run variants "
+            "of it (`catenary sweep`)."
+        )
+    return sentences

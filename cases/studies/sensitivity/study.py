@@ -48,6 +48,7 @@ class Sensitivity:
         parameter's key
     by_uplift : of each parameter that of the largest uplift [m]
     n_steps : of the march
+    step_m : what it runs in a step
     contact_switches, link_switches : see ``Tangents``
     left_out : keys of usual parameters by which it cannot be differentiated, and why
     """
@@ -56,6 +57,7 @@ class Sensitivity:
     statistics: list[dict[str, float]]
     max_uplift: float
     n_steps: int
+    step_m: float
     contact_switches: int
     link_switches: int
     parameters: list[Parameter] = field(default_factory=list)
@@ -181,6 +183,7 @@ def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
         statistics,
         float(marched.uplift.max()) if marched.uplift.size else float("nan"),
         len(marched.force),
+        marched.speed * marched.dt,
         marched.contact_switches,
         marched.link_switches,
     )

@@ -15,6 +15,7 @@ from catenary.cases.result_folder.output_folder import (
     refuse_earlier,
     refuse_impossible,
 )
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.sweep.jobs import (
     HISTORIES,
@@ -25,6 +26,7 @@ from catenary.cases.studies.sweep.jobs import (
     in_order,
     jobs_and_refused,
 )
+from catenary.cases.studies.sweep.same_scene import other_value
 from catenary.cases.studies.sweep.variants import Variant
 
 if TYPE_CHECKING:
@@ -112,7 +114,7 @@ def sweep_of(
     from catenary.cases.studies.sweep.together import ensemble_of
 
     ensemble = ensemble_of(draft, variants, histories)
-    refuse_other_sweep(out, variants, force)
+    refuse_other_sweep(out, variants, force, draft)
     return ensemble
 
 
@@ -192,20 +194,38 @@ def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions
     return ended
 
 
-def refuse_other_sweep(out: Path, variants: Sequence[Variant], force: bool) -> None:
-    """Raise InputError if ``out`` has a table of a sweep with other variants, unless ``force``."""
+def refuse_other_sweep(
+    out: Path, variants: Sequence[Variant], force: bool, draft: Draft | None = None
+) -> None:
+    """Raise InputError if ``out`` has a table of another sweep, unless ``force``: of variants that
+    this one has not, or that have other values here, or of another scene than that of ``draft``.
+
+    Folders of whole runs are compared with the ``draft`` of each when it is their turn.
+    """
     refuse_impossible(out)
     path = out / "sweep.json"
     if force or not path.is_file():
         return
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
-        there = {str(one["name"]) for one in table["variants"]}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        there = set()
-    other = sorted(there - {variant.name for variant in variants})
-    if other:
+        there = {str(one["name"]): list(one["assignments"]) for one in table["variants"]}
+        scene, varied = table.get("scene") or {}, [str(key) for key in table["varied"]]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return
+    here = {variant.name: list(variant.assignments) for variant in variants}
+    replace = f"{another_folder()}, or give {force_option()} to replace it"
+    if other := sorted(there.keys() - here.keys()):
         raise InputError(
-            f"{path} is the table of a sweep with other variants ({other[0]}); "
-            f"{another_folder()}, or give {force_option()} to replace it"
+            f"{path} is the table of a sweep with other variants ({other[0]}); {replace}"
+        )
+    if other := sorted(name for name, values in there.items() if values != here[name]):
+        raise InputError(f"{path} is the table of a sweep with another {other[0]}; {replace}")
+    if draft is None or not scene:
+        return
+    own = json.loads(json.dumps(draft.table(), default=str))
+    if (differs := other_value(scene, own, varied)) is not None:
+        key, value, wanted = differs
+        raise InputError(
+            f"{path} is the table of a sweep with {key} = {shown(value)}, here it is "
+            f"{shown(wanted)}; {replace}"
         )

@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import shown
@@ -18,6 +18,9 @@ from catenary.cases.scene.input.toml_input import parse_assignment, read_toml
 from catenary.cases.scene.keys.error_sentences import unknown_key
 from catenary.cases.scene.keys.keys import known_keys, list_of, names_value
 from catenary.postproc.files.csv_text import begins_formula
+
+if TYPE_CHECKING:
+    from catenary.cases.scene.scene import Scene
 
 MAX_VARIANTS = 10_000
 MOST_LETTERS = 200  # in a variant's name
@@ -161,6 +164,45 @@ def check_key(key: str, where: str) -> None:
         raise InputError(unknown_key(key, where, known))
 
 
+def share_a_value(key: str, other: str) -> bool:
+    """Whether two dotted keys are the same, or one of them stands within the other."""
+    shorter, longer = sorted((_parts(key), _parts(other)), key=len)
+    return longer[: len(shorter)] == shorter
+
+
+def refuse_idle(key: str, scene: Scene, where: str) -> None:
+    """Refuse to vary an irregularity of a scene whose effect is switched off.
+
+    Parameters
+    ----------
+    key : dotted, of any kind
+    scene : as it stands
+    where : the place that names the key, with which the sentence begins
+
+    Raises
+    ------
+    InputError
+        If the effect is off, so that all values of the key are the same scene.
+    """
+    table, _, rest = key.partition(".")
+    effect = rest.partition(".")[0]
+    if table == "irregularities" and not scene.effects.get(effect, True):
+        raise InputError(
+            f"{where} would change nothing: effects.{effect} "
+            f"{scene.origin.of(f'effects.{effect}')} is false"
+        )
+
+
+def sets_again(later: str, earlier: str) -> bool:
+    """Whether nothing is left of the value of a dotted key when a later one is set."""
+    return share_a_value(earlier, later) and later.count(".") <= earlier.count(".")
+
+
+def _parts(key: str) -> list[str]:
+    """The parts of a dotted key, numbers of entries without zeros in front."""
+    return [str(int(part)) if part.isdecimal() else part for part in key.split(".")]
+
+
 def _quoted(value: Any) -> str:
     """Text of a value within a list or a table, where texts stand in quotes."""
     return json.dumps(value) if isinstance(value, str) else text_of(value)
@@ -194,12 +236,25 @@ def product(
     Raises
     ------
     InputError
-        If a key is varied twice or there are too many combinations.
+        If a key is varied twice, or a later one sets it again, or there are too many combinations.
     """
     keys = [each.key for each in varied]
     for key in keys:
         if keys.count(key) > 1:
             raise InputError(f"--vary {key} is given twice; name all its values in one --vary")
+    for earlier, later in itertools.combinations(keys, 2):
+        if sets_again(later, earlier):
+            raise InputError(
+                f"--vary {later} sets {earlier} again, so that the values of the latter would be "
+                f"lost; name {later} first"
+            )
+    for (name, assignments), key in itertools.product(named.items(), keys):
+        for given in (text.partition("=")[0].strip() for text in assignments):
+            if sets_again(key, given):
+                raise InputError(
+                    f"--vary {key} sets the {given} of variant {shown(name)[1:-1]} again, so that "
+                    "the latter would be lost; leave one of them out"
+                )
     count = max(len(named), 1)
     for each in varied:
         count *= len(each.values)

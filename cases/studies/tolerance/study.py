@@ -19,6 +19,7 @@ from catenary.cases.studies.scene_sets import (
     SceneSet,
     Wanted,
     members_of,
+    refuse_shared,
     values_of,
 )
 from catenary.cases.studies.sweep.jobs import STATISTICS
@@ -222,7 +223,8 @@ def make_plan(draft: Draft, task: ToleranceTask) -> Plan:
     scene = draft.scene()
     scenes = SceneSet(draft, members_of(task.set)).checked()
     groups = groups_of(task.errors, scene)
-    for group in groups:
+    for number, group in enumerate(groups):
+        refuse_shared(scenes.members, group.key, f"errors.{number}")
         if group.table.level > group.table.most:
             raise InputError(
                 f"errors {group.table.name}: level is {group.table.level:g} {group.unit}; it must "
@@ -286,7 +288,7 @@ class _Varied:
         """Values of a scene with errors, over their tolerances, of each group."""
         found: dict[str, Any] = {}
         for group, scale, own in zip(self.groups, self.scales, errors, strict=True):
-            found |= group.values(level * scale * own)
+            found |= group.values(level * scale * own, found)
         return found
 
     def sample(self, number: int) -> list[np.ndarray]:

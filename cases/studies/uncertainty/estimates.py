@@ -5,9 +5,7 @@ Samples are independent values, shape (n,); a mean and a deviation take two of t
 
 from __future__ import annotations
 
-import functools
 import warnings
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,8 +13,9 @@ import numpy as np
 CONFIDENCE = 0.95
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 _RESAMPLES = 2000
-# Resamples of fewer values are too few different ones; of more they need n^2 numbers.
-_FEWEST_RESAMPLED, _MOST_RESAMPLED = 10, 1000
+# Of fewer values there are too few different resamples, and no kurtosis; of more resamples need n^2
+# numbers.
+_FEWEST, _MOST_RESAMPLED = 10, 1000
 
 
 class Bounded(NamedTuple):
@@ -39,50 +38,62 @@ def student(x: np.ndarray) -> Bounded:
 def mean(x: np.ndarray) -> Bounded:
     """Mean with bounds by the bootstrap (BCa, Efron 1987), which stay where values can be.
 
-    Of fewer than ``_FEWEST_RESAMPLED`` values, or more than ``_MOST_RESAMPLED``, by Student's
+    Of fewer than ``_FEWEST`` values, or more than ``_MOST_RESAMPLED``, by Student's
     distribution.
     """
-    if np.ptp(x) == 0.0 or not _FEWEST_RESAMPLED <= len(x) <= _MOST_RESAMPLED:
+    if np.ptp(x) == 0.0 or not _FEWEST <= len(x) <= _MOST_RESAMPLED:
         return student(x)
-    return _bootstrap(x, np.mean)
+    return _bootstrap(x)
 
 
 def deviation(x: np.ndarray) -> Bounded:
     """Standard deviation s with n - 1 degrees of freedom, and its bounds.
 
-    Up to ``_MOST_RESAMPLED`` values by the bootstrap (BCa, Efron 1987); of more by the normal
-    limit, var(s) = s^2 (kurtosis - 1)/(4 n) (Cramer 1946, sec. 27.7). Fewer than
-    ``_FEWEST_RESAMPLED`` values have none.
+    ln(c s^2) is taken as normal, with c = n/(n - z) and the variance
+    c^2 (kurtosis - (n - 3)/n)/(n - 1); the kurtosis is that about a trimmed mean (D. Bonett,
+    Comput. Stat. Data Anal. 50, 2006, 775). Fewer than ``_FEWEST`` values have no bounds.
     """
     from scipy import stats
 
     n, value = len(x), float(np.std(x, ddof=1))
     if np.ptp(x) == 0.0:
         return Bounded(0.0, 0.0, 0.0)
-    if n < _FEWEST_RESAMPLED:
+    if n < _FEWEST:
         return Bounded(value, np.nan, np.nan)
-    if n > _MOST_RESAMPLED:
-        error = value * np.sqrt((stats.kurtosis(x, fisher=False) - 1.0) / (4.0 * n))
-        half = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) * error)
-        return Bounded(value, value - half, value + half)
-    return _bootstrap(x, functools.partial(np.std, ddof=1))
+    z = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE))
+    factor = n / (n - z)
+    middle = stats.trim_mean(x, 0.5 / np.sqrt(n - 4.0))
+    # Over s, so that the fourth power of small values does not underflow.
+    kurtosis = n * np.sum(((x - middle) / value) ** 4) / (n - 1.0) ** 2
+    half = z * factor * np.sqrt((kurtosis - (n - 3.0) / n) / (n - 1.0))
+    low, high = value * np.sqrt(factor) * np.exp(0.5 * half * np.array([-1.0, 1.0]))
+    return Bounded(value, float(low), float(high))
 
 
-def _bootstrap(x: np.ndarray, estimate: Callable[..., Any]) -> Bounded:
-    """An estimate with BCa bounds; NaN where values are so alike that resamples show none."""
+def _bootstrap(x: np.ndarray) -> Bounded:
+    """Mean with BCa bounds; NaN where values are so alike that resamples show none.
+
+    Resamples of n values scatter by sqrt((n - 1)/n) too little and are normal where Student's
+    distribution is wider, so that intervals of 95 % would hold the truth in 87 % of ten normal
+    values. They are taken at the greater level that mends both (T. Hesterberg, Am. Stat. 69, 2015,
+    371, the expanded interval).
+    """
     from scipy import stats
 
+    n = len(x)
+    wider = np.sqrt(n / (n - 1.0)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)
+    level = float(2.0 * stats.norm.cdf(wider) - 1.0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", stats.DegenerateDataWarning)
         found = stats.bootstrap(
             (x,),
-            lambda sample, axis: estimate(sample, axis=axis),
+            np.mean,
             n_resamples=_RESAMPLES,
-            confidence_level=CONFIDENCE,
+            confidence_level=level,
             method="BCa",
             random_state=np.random.default_rng(1),
         ).confidence_interval
-    return Bounded(float(estimate(x)), float(found.low), float(found.high))
+    return Bounded(float(np.mean(x)), float(found.low), float(found.high))
 
 
 def quantile(x: np.ndarray, probability: float) -> Bounded:

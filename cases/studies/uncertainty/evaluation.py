@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +40,7 @@ class Uncertainty:
     sensitivity : rows of ``sensitivity.indices``
     remarks : remarks on runs, and the number of runs with each, the most frequent first
     notes : sentences on what is left out
+    is_sampled : whether the inputs are known to be samples, so that shares are probabilities
     """
 
     n_runs: int
@@ -50,6 +52,7 @@ class Uncertainty:
     sensitivity: list[Row]
     remarks: list[Row]
     notes: list[str]
+    is_sampled: bool
 
 
 def evaluate(table: RunTable) -> Uncertainty:
@@ -75,16 +78,23 @@ def evaluate(table: RunTable) -> Uncertainty:
     runs = table.runs
     n_done = int((runs["outcome"] == DONE).sum())
     method, sensitivity, notes = indices(table)
+    probabilities = failing(independent)
     if n_done < len(runs):
         broken = counted(len(runs) - n_done, "run")
         others = "; estimates are of the others" if statistics else ""
+        others += ", and no probability counts a run that broke as failed" if probabilities else ""
         notes.insert(0, f"{broken} of {len(runs)} did not end{others}")
     if not statistics:
         notes.insert(0, "there are no estimates, which take figures of at least two runs")
-    probabilities = failing(independent)
+    is_sampled = table.sampling is not None
+    if statistics and not is_sampled:
+        notes.append(
+            "no sampling is known: means, quantiles and shares are those of these runs, and bounds "
+            "hold if their inputs are independent samples"
+        )
     return Uncertainty(
         len(runs), n_done, statistics, quantiles, probabilities, method, sensitivity,
-        _remarks(runs), notes,
+        _remarks(runs), notes, is_sampled,
     )  # fmt: skip
 
 
@@ -116,18 +126,20 @@ def failing(table: RunTable) -> list[Row]:
     A run counts for a criterion that was judged in it. Without a column ``judged`` every criterion
     that fails in some run is taken as judged in all runs with a verdict.
     """
-    done = table.done.drop_duplicates("variant")
+    done = table.done
     if "failed" not in done:
         return []
-    failed = [list(one) for one in done["failed"]]
+    # Rows of a run have all its criteria each, or those of their pantograph.
+    runs_of = done.groupby("variant", sort=False)
+    failed = [_united(own) for _, own in runs_of["failed"]]
     if "judged" in done:
         judged = [
-            list(dict.fromkeys([*own, *more]))
-            for own, more in zip(done["judged"], failed, strict=True)
+            list(dict.fromkeys([*_united(own), *more]))
+            for (_, own), more in zip(runs_of["judged"], failed, strict=True)
         ]
     else:
         every = list(dict.fromkeys(name for own in failed for name in own))
-        known = done["passed"].notna() if "passed" in done else [True] * len(done)
+        known = runs_of["passed"].count() > 0 if "passed" in done else [True] * len(failed)
         judged = [every if one else [] for one in known]
     runs = list(zip(judged, failed, strict=True))
     rows = []
@@ -138,6 +150,11 @@ def failing(table: RunTable) -> list[Row]:
         hits = [bool(lost) for own, lost in runs if own]
         rows.append(_probability(ANY_CRITERION, sum(hits), len(hits)))
     return rows
+
+
+def _united(lists: Iterable[Sequence[str]]) -> list[str]:
+    """The criteria of all rows of a run, each once."""
+    return list(dict.fromkeys(name for own in lists for name in own))
 
 
 def _probability(criterion: str, failed: int, n: int) -> Row:

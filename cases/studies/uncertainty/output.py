@@ -238,6 +238,7 @@ PICTURES = {
     "uncertainty_histogram.png": histograms,
 }
 _MOST_REMARKS = 5  # on a terminal; all are in the file
+_WHAT_FAILS = ("Share of the runs in which", "Probability that")  # by whether these are samples
 
 
 def write(
@@ -276,8 +277,8 @@ def as_text(found: Uncertainty) -> str:
         parts.append(_statistics(found).text())
     if found.probabilities:
         parts.append(
-            "Probability that a criterion fails, with 95 % bounds (Clopper-Pearson)\n"
-            + _probabilities(found).text()
+            f"{_WHAT_FAILS[found.is_sampled]} a criterion fails, with 95 % bounds "
+            f"(Clopper-Pearson)\n{_probabilities(found).text()}"
         )
     # Of columns that people read.
     hidden = [name for name, column in STATISTICS.items() if not column.head]
@@ -327,7 +328,7 @@ def _probabilities(found: Uncertainty) -> StudyTable:
         Column("criterion", "criterion"),
         Column("failed", "failed", "d"),
         Column("n", "of", "d"),
-        Column("probability", "probability", ".4g"),
+        Column("probability", "probability" if found.is_sampled else "share", ".4g"),
         Column("bounds", "95 %", ">"),
     ]
     rows = [row | {"bounds": _bounds(row, "probability")} for row in found.probabilities]

@@ -143,6 +143,9 @@ def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
                 rows.append({**here, "key": key, **row, "rank_correlation": float(ranks[key])})
     if few:
         notes.append(f"first-order indices need at least {_FEWEST} runs")
+    together = table.sampling.correlations if table.sampling is not None else []
+    for one in together if rows else ():
+        notes.append(f"the indices of {' and '.join(one.keys)} also hold what these share")
     return rows, notes
 
 
