@@ -26,7 +26,6 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length, hang
 from catenary.solver.statics.form_finding.lateral_equilibrium import lateral_shape
-from catenary.solver.statics.form_finding.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.form_finding.sparse_sum import (
     BandedFactors,
     Part,
@@ -34,6 +33,7 @@ from catenary.solver.statics.form_finding.sparse_sum import (
     columns_of,
     wire_parts,
 )
+from catenary.solver.statics.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.rest_loads import dead_loads, exact_moments
 
 # Lengths are printed to a tenth of a millimetre; the iteration contracts by the ratio of dropper
