@@ -197,6 +197,8 @@ class Model:
         """Gravity load (n_dofs,) [N], [N m]; summed at each access."""
         weight, gravity = np.zeros(self.n_dofs), self.simulated.gravity
         for dofs, mass, kind in self.hanging if gravity else ():
+            if not dofs.size:
+                continue  # hardware of masts, of which a line of one span has none
             own = mass if kind is None else mass[kind]
             every = np.bincount(dofs.ravel(), weights=own.ravel(), minlength=self.n_dofs)
             weight -= np.multiply(every, gravity, out=every)
