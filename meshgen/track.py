@@ -74,6 +74,17 @@ class Curve:
         """1/R at places ``x`` [m], > 0 to the left, shape as ``x`` [1/m]."""
         return self.curvature * self.share(x)
 
+    def upright_curvature_at(self, x: np.ndarray) -> np.ndarray:
+        """Part of 1/R across the canted plane at places ``x`` [m], >= 0 upwards, shape as ``x``
+        [1/m]: a straight wire runs inside of the curve, above the inner rail, which is low."""
+        share = self.share(x)
+        return np.asarray(abs(self.curvature) * share * np.sin(self.tilt * share))
+
+    def upright_part_at(self, x: np.ndarray) -> np.ndarray:
+        """Part across the canted plane of a level force to the left at places ``x`` [m], > 0
+        upwards, shape as ``x`` [-]."""
+        return np.asarray(np.sign(self.curvature) * np.sin(self.tilt * self.share(x)))
+
     def sideways_pull_at(self, x: np.ndarray) -> np.ndarray:
         """Share of a weight that pulls sideways across the canted track at places ``x`` [m], > 0 to
         the left, shape as ``x`` [-]."""

@@ -31,6 +31,7 @@ from catenary.solver.integrators.line_state import LineState
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
+from catenary.solver.model.links import Links
 from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.partition import distribute
 from catenary.solver.model.rest_shape import Equilibrium
@@ -85,9 +86,21 @@ class TautLines:
                 if self._stiff is None:  # of a line with other matrices no lane takes the result
                     self._stiff = StiffLine(taut)
                 moved, form = _displaced(taut, model.dropper_gap, form, self._stiff)
+                taut.links = [_from_taut(own, moved) for own in taut.links]
             links = switching_links(taut, form.dropper_force)
             self._latest = TautLine(model, taut, form, moved, links)
         return self._latest
+
+
+def _from_taut(own: Links, moved: np.ndarray) -> Links:
+    """Open links, such as uplift stops, of a line whose displacements count from a shape in which
+    its rest is ``moved`` (n_dofs,) [m]."""
+    if not own.law["open"].any():
+        return own
+    law, (unknowns, weights) = own.law.copy(), own.direction
+    stretch = (weights * moved[unknowns]).sum(axis=1)
+    law["rest"] -= np.where(law["open"], law["stiffness"] * stretch, 0.0)
+    return replace(own, law=law)
 
 
 def _displaced(

@@ -43,7 +43,7 @@ def strain_rows(model: Model, wire: str) -> np.ndarray:
             bent = slope_rows(length, shape_of(course, slope, pairs))
             rows[:, 2 + 4 * number : 6 + 4 * number] = np.round(bent / _SLOPE) * _SLOPE
         if form.lateral is not None:
-            rows[:, 6:] += curve_rows(model, wire)
+            rows[:, 2:] += np.concatenate(curve_rows(model, wire), axis=1)
     return rows
 
 
@@ -56,19 +56,22 @@ def shape_of(course: np.ndarray, slope: np.ndarray, pairs: np.ndarray) -> np.nda
     return np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
 
 
-def curve_rows(model: Model, wire: str) -> np.ndarray:
-    """Strain of elements by lateral deflection in a curve, -c times its mean, (n, 4) [1/m], [-]:
-    towards the centre a wire is shorter."""
+def curve_rows(model: Model, wire: str) -> tuple[np.ndarray, np.ndarray]:
+    """Strain of elements by deflections across the canted plane of a curve and along it, -c times
+    their means with the parts c of the curvature, (n, 4) each [1/m], [-]: towards the centre a wire
+    is shorter. Zero on straight track."""
     return rows_in_curve(model.problem.line.curve, model.mesh.x(model.mesh.elements(wire)))
 
 
-def rows_in_curve(curve: Curve | None, x: np.ndarray) -> np.ndarray:
-    """Curvature of elements with ends at ``x`` (n, 2) [m], zero on straight track."""
+def rows_in_curve(curve: Curve | None, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``curve_rows`` of elements with ends at ``x`` (n, 2) [m]."""
     if curve is None:
-        return np.zeros((len(x), 4))
-    length = np.diff(x, axis=1)
-    curvature = curve.curvature_at(x.mean(axis=1))
-    return np.asarray(-curvature[:, None] * beam.uniform_load(length[:, 0]) / length)
+        return np.zeros((len(x), 4)), np.zeros((len(x), 4))
+    middle, length = x.mean(axis=1), np.diff(x, axis=1)
+    means = beam.uniform_load(length[:, 0]) / length
+    parts = curve.upright_curvature_at(middle), curve.curvature_at(middle)
+    upright, level = (-part[:, None] * means for part in parts)
+    return upright, level
 
 
 def slope_rows(length: np.ndarray, shape: np.ndarray) -> np.ndarray:

@@ -64,6 +64,8 @@ class Equilibrium:
     gained_tension : (n_elements,) of wires by name, what their elements carry beside the tension of
         the installation [N]; wires that are not named carry nothing more
     arm_lift : (n_arms,) force by which arms hold their wire at its height, zero of others [N]
+    arm_raised : (n_arms,) how far the wire at each arm has risen since its installation, of lines
+        with uplift stops, which do not rise [m]; empty where that is nothing
     lateral : the line at rest in the lateral plane, None if it is not simulated
     """
 
@@ -74,6 +76,7 @@ class Equilibrium:
     along: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gained_tension: Mapping[str, np.ndarray] = field(default_factory=dict)
     arm_lift: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    arm_raised: np.ndarray = field(default_factory=lambda: np.zeros(0))
     lateral: LateralShape | None = None
 
     def leaning(self, droppers: np.ndarray) -> np.ndarray:

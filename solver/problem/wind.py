@@ -35,7 +35,8 @@ class Profile:
 class Stretch:
     """A part of the line from ``start`` to ``end`` [m] with another exposure.
 
-    ``factor`` of mean and gusts; ``height`` [m] of the wires above ground, None for that elsewhere.
+    ``factor`` of mean and gusts; ``height`` [m] of the wires above ground, with which the mean
+    alone grows, None for that elsewhere.
     """
 
     start: float

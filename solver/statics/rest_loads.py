@@ -37,18 +37,27 @@ def dead_loads(model: Model) -> np.ndarray:
         middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
         pull = mean_load(wind, model.problem.tunnels, wire, middle)
         np.add.at(load, dofs, pull[:, None] * beam.uniform_load(length))
+        if line.curve is not None:
+            pull *= line.curve.upright_part_at(middle)
+            upright, _ = model.wire_elements(wire.name)
+            np.add.at(load, upright, pull[:, None] * beam.uniform_load(length))
     return load
 
 
 def curve_load(model: Model) -> np.ndarray:
-    """Pull of the tension of the installation towards the centre of a curve, (n_dofs,) [N],
-    [N m]. A course y across a track of curvature c has the curvature y'' + c in plan."""
+    """Pull of the tension of the installation towards the centre of a curve, (n_dofs,) [N], [N m],
+    of lines with lateral motion. A course y across a track of curvature c has the curvature
+    y'' + c in plan, of which a canted plane has a part across itself."""
     load = np.zeros(model.n_dofs)
-    for wire in model.problem.line.wires if model.problem.line.curve is not None else ():
-        dofs, length = wire_elements(model, wire.name, _LEVEL)
+    if model.problem.line.curve is None or not model.simulated.lateral:
+        return load
+    for wire in model.problem.line.wires:
+        upright, length = model.wire_elements(wire.name)
+        level, _ = wire_elements(model, wire.name, _LEVEL)
         middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
         pull = wire.tension_at(middle) * length
-        np.add.at(load, dofs, -pull[:, None] * curve_rows(model, wire.name))
+        for dofs, rows in zip((upright, level), curve_rows(model, wire.name), strict=True):
+            np.add.at(load, dofs, -pull[:, None] * rows)
     return load
 
 
@@ -67,6 +76,8 @@ def exact_moments(model: Model) -> np.ndarray:
         weight = model.simulated.gravity * wire.mass_per_length
         np.add.at(load, dofs, -weight * moments)
         if curve is not None:
+            pull = curve.upright_curvature_at(middle) * tension
+            np.add.at(load, dofs, pull[:, None] * moments)
             pull = curve.sideways_pull_at(middle) * weight + curve.curvature_at(middle) * tension
             sideways, _ = wire_elements(model, wire.name, _LEVEL)
             np.add.at(load, sideways, pull[:, None] * moments)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.solver.ends.half_lines import Chain, chain_at, half_lines
 from catenary.solver.ends.line_beyond import END, shared_at, sideways, span_between
 from catenary.solver.model.model import Model
@@ -65,7 +66,7 @@ def end_reflection(model: Model, side: int, frequency: np.ndarray) -> EndReflect
     Raises
     ------
     InputError
-        If spans are joined by more than a cross-section at a mast.
+        If spans are joined by more than a cross-section at a mast, or there is none before the end.
     """
     damping = model.simulated.damping
     whole = replace(model, constrained=model.numbering.missing)
@@ -75,6 +76,8 @@ def end_reflection(model: Model, side: int, frequency: np.ndarray) -> EndReflect
     # From the end inwards.
     masts = line.support_positions[:: -1 if side == END else 1]
     n_end = end.n_spans if isinstance(end, AbsorbingLayer) else 1
+    if len(masts) < n_end + 2:
+        raise InputError("a line needs two spans (line.n_spans) for waves that come to its end")
     signs = _signs(whole, masts[n_end:], weights[:1])
     incoming = _chain(whole, masts[n_end + 1], masts[n_end], weights, signs)
     after, before = half_lines(incoming)

@@ -28,7 +28,7 @@ from catenary.solver.wind.wind_at import (
     across_at,
     directions,
     drag_width,
-    exposure,
+    gust_exposure,
     gust_points,
     horizontal_gusts,
 )
@@ -158,7 +158,7 @@ def upward_pressure(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
         times (first + i) ``interval``.
     """
     mean = across_at(wind, model.problem.tunnels, points)
-    exposed = exposure(wind, points, model.problem.tunnels)
+    exposed = gust_exposure(wind, points, model.problem.tunnels)
     upward = GustField(wind, UPWARD, points, _apart(points))
     across = _Across(wind, points, exposed) if wind.quadratic else None
 
@@ -177,7 +177,7 @@ def upward_pressure(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
 def _lateral(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
     """Force of gusts to the left over diameter times drag coefficient [N/m2]."""
     mean = across_at(wind, model.problem.tunnels, points)
-    exposed = exposure(wind, points, model.problem.tunnels)
+    exposed = gust_exposure(wind, points, model.problem.tunnels)
     across = _Across(wind, points, exposed)
     upward = GustField(wind, UPWARD, points, _apart(points)) if wind.quadratic else None
 

@@ -17,15 +17,26 @@ from catenary.solver.wind.spectra import ACROSS, ALONG
 
 
 def exposure(wind: Wind, places: np.ndarray, tunnels: Sequence[Tunnel] = ()) -> np.ndarray:
-    """Speeds of mean and gusts at places [m] over those outside of stretches, shape as ``places``.
+    """Mean speed at places [m] over that outside of stretches, shape as ``places``.
 
     In tunnels there is no wind.
     """
+    found = gust_exposure(wind, places, tunnels)
+    for stretch in wind.stretches:
+        if stretch.height is not None:
+            inside = (places >= stretch.start) & (places < stretch.end)
+            found[inside] *= float(wind.profile.growth(stretch.height, wind.height))
+    return found
+
+
+def gust_exposure(wind: Wind, places: np.ndarray, tunnels: Sequence[Tunnel] = ()) -> np.ndarray:
+    """Speed of the gusts at places [m] over that outside of stretches, shape as ``places``.
+
+    The mean grows with the height, the friction velocity, of which gusts are a multiple, does not.
+    """
     found = np.ones(places.shape)
     for stretch in wind.stretches:
-        inside = (places >= stretch.start) & (places < stretch.end)
-        height = wind.height if stretch.height is None else stretch.height
-        found[inside] = stretch.factor * float(wind.profile.growth(height, wind.height))
+        found[(places >= stretch.start) & (places < stretch.end)] = stretch.factor
     for tunnel in tunnels:
         found *= 1.0 - tunnel.depth(places)
     return found
@@ -91,8 +102,9 @@ def wind_at(wind: Wind, start: float, end: float) -> WindAt:
 
     def gusty(places: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         u, v = (_sampled(field, points, places, times) for field in fields)
-        exposed, u = exposure(wind, places), u + wind.mean
-        return exposed * (with_train * u - across * v), exposed * (across * u + with_train * v)
+        exposed = gust_exposure(wind, places)
+        u, v = wind.mean * exposure(wind, places) + exposed * u, exposed * v
+        return with_train * u - across * v, across * u + with_train * v
 
     return gusty
 

@@ -49,10 +49,15 @@ class SpatialLine:
             pairs = mesh.elements(wire.name)
             x = mesh.x(pairs)
             h, c = np.diff(x, axis=1)[:, 0], np.zeros(len(pairs))
+            upright = c
             if line.curve is not None:
                 c = line.curve.curvature_at(x.mean(axis=1))
+                # The whole line is in the curve: the part of 1/R across its canted plane.
+                upright = np.abs(c) * np.sin(line.curve.tilt)
             was = first.height, first.slope, first.lateral.y, first.lateral.slope
             grown = -2 * c * (_mean(h, y, turn, pairs) - _mean(h, was[2], was[3], pairs))
+            was_z = _mean(h, was[0], was[1], pairs)
+            grown = grown - 2 * upright * (_mean(h, z, slope, pairs) - was_z)
             for now, then in (((z, slope), was[:2]), ((y, turn), was[2:])):
                 grown = grown + _both(square_of_slope, h, *now, pairs)
                 grown = grown - _both(square_of_slope, h, *then, pairs)

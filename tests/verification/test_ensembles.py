@@ -160,12 +160,16 @@ def test_lines_with_other_errors_of_dropper_lengths_share_matrices(
 
 
 @pytest.mark.study
+@pytest.mark.parametrize("stops", [{}, {"line.steady_arm.uplift_stop_m": 0.03}])
 def test_lines_with_other_slack_droppers_at_rest_share_lanes(
-    monkeypatch: pytest.MonkeyPatch,
+    stops: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Own runs hold a slack dropper open, lanes taut with a compensation from the start."""
+    """Own runs hold a slack dropper open, lanes taut with a compensation from the start. Stops of
+    all are where they were installed."""
     key = "irregularities.dropper_lengths"
-    changes = [{f"{key}.standard_deviation_mm": 12.0, f"{key}.seed": seed} for seed in range(1, 5)]
+    changes = [
+        {f"{key}.standard_deviation_mm": 12.0, f"{key}.seed": seed} | stops for seed in range(1, 5)
+    ]
     scenes = scenes_of("en50318_2002", changes)
     slack = [
         np.flatnonzero(line_at_rest(problem_of(one), mesh_of(one)).model.dropper_gap).tolist()

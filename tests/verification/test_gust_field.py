@@ -159,6 +159,16 @@ def test_mean_wind_follows_profile_and_exposure() -> None:
     check("in a tunnel", sheltered, [1.0, higher, 0.0], within=1e-12)
 
 
+def test_a_viaduct_has_the_mean_of_its_height_and_the_gusts_of_the_plain() -> None:
+    high, places = Stretch(100.0, 200.0, 1.0, 31.0), np.array([50.0, 150.0, 250.0])
+    over_viaduct = wind_at(replace(WIND, stretches=(high,)), 0.0, 300.0)
+    over_plain, times = wind_at(WIND, 0.0, 300.0), np.full(3, 33.3)
+    more = 25.0 * (np.log(31.0 / 0.05) / np.log(10.0 / 0.05) - 1.0)
+    for part, mean in ((1, [0.0, more, 0.0]), (0, [0.0, 0.0, 0.0])):
+        differ = over_viaduct(places, times)[part] - over_plain(places, times)[part]
+        check("faster than over the plain [m/s]", differ, mean, within=1e-12)
+
+
 def test_wind_at_moving_places_is_that_of_the_field() -> None:
     """Between points and slices it is linear; across the track it is the gust along the wind."""
     moving = wind_at(WIND, 0.0, 600.0)

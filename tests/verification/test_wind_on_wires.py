@@ -95,6 +95,23 @@ def test_upward_gusts_lift_with_half_of_the_drag(mesh: LineMesh) -> None:
     assert force.std() > 1.0
 
 
+@pytest.mark.parametrize("quadratic", [False, True])
+def test_gusts_high_above_ground_are_as_strong_in_a_faster_mean(
+    mesh: LineMesh, quadratic: bool
+) -> None:
+    """The friction velocity does not grow with the height, and Davenport's spectrum is that of all
+    heights: a viaduct has the gusts of the plain, and their force grows with its mean wind alone.
+    """
+    wind = replace(WIND, quadratic=quadratic, stretches=(Stretch(-1.0, 1e3, 1.0, 40.0),))
+    # Small ones, of which the square leaves one part in 1e5.
+    wind = replace(wind, gusts=replace(wind.gusts, friction_velocity=1e-4))
+    force, gusts, points = load_and_field(mesh, wind)
+    there = 25.0 * np.log(40.0 / 0.05) / np.log(10.0 / 0.05)
+    per_length = 0.5 * RHO * DIAMETER * DRAG * there * gusts
+    expected = trapezoid(per_length, points, axis=1)
+    check("force [N]", force, expected, within=2e-5 * np.abs(expected).max())
+
+
 def test_the_square_of_the_wind_agrees_with_its_linear_part_for_small_gusts(mesh: LineMesh) -> None:
     """What is left out, 1/2 rho d C_d w u / U and smaller, falls with the square of the gusts."""
     errors = []

@@ -23,7 +23,7 @@ class WindStretchTable(StretchTable):
         1.0, ge=0, le=3, description="wind speeds there over those elsewhere, gusts included"
     )
     height_m: float | None = Field(
-        None, ge=1, le=300, description="height of the wires above ground there"
+        None, ge=1, le=300, description="height of the wires above ground there, for the mean wind"
     )
 
 

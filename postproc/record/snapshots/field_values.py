@@ -125,11 +125,14 @@ class FieldValues:
     ) -> Iterator[tuple[tuple[str, str], tuple[np.ndarray, np.ndarray], np.ndarray]]:
         """Unknowns, place and slope at rest of each plane of a wire with nodes at ``x`` (n,), and
         what a curve adds to the strain of its elements (n - 1, 4)."""
-        yield (UP, SLOPE), (self._height, self._slope), np.zeros((nodes.size - 1, 4))
-        if self._lateral is not None:
-            ends = np.stack([x[:-1], x[:-1] + length], axis=1)
-            at_rest = self._lateral.y, self._lateral.slope
-            yield (ASIDE, TURN), at_rest, rows_in_curve(self._curve, ends)
+        at_rest = self._height, self._slope
+        if self._lateral is None:
+            yield (UP, SLOPE), at_rest, np.zeros((nodes.size - 1, 4))
+            return
+        ends = np.stack([x[:-1], x[:-1] + length], axis=1)
+        upright, level = rows_in_curve(self._curve, ends)
+        yield (UP, SLOPE), at_rest, upright
+        yield (ASIDE, TURN), (self._lateral.y, self._lateral.slope), level
 
     def _bending_moment(self, block: Block, known: Gathered) -> np.ndarray:
         nodes = block.nodes

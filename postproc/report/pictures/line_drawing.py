@@ -159,9 +159,11 @@ def _cross_section(
     stretch: tuple[float, float],
     half_head: float | None,
 ) -> None:
-    """Wires at the support nearest to the middle (full) and half a span further (hollow)."""
+    """Wires at the support nearest to the middle (full) and half a span further (hollow); of one
+    span at its first anchor."""
     masts = line.support_positions
-    number = int(np.argmin(np.abs(masts[1:-1] - 0.5 * sum(stretch)))) + 1
+    first = 1 if line.n_spans > 1 else 0
+    number = int(np.argmin(np.abs(masts[first:-1] - 0.5 * sum(stretch)))) + first
     at, between = masts[number], 0.5 * (masts[number] + masts[number + 1])
     for wire in line.wires:
         for x, face in ((at, _COLOUR[wire.role]), (between, "none")):

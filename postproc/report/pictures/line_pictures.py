@@ -283,7 +283,8 @@ def plan_view(results: Results) -> Figure:
         "force to the left [N]",
         "Radial forces of the steady arms",
     )
-    legend_above(forces)
+    if forces.get_legend_handles_labels()[0]:  # none without arms
+        legend_above(forces)
     forces.set_xlim(plan.get_xlim())
     return figure
 

@@ -127,13 +127,14 @@ def _lateral(results: Results) -> Iterator[Text]:
     """Radial forces, and where contact wires that move sideways are at rest in running spans."""
     arms = results.registration()
     assert arms is not None
-    low, high = (number(float(end)) for end in (arms.tension.min(), arms.tension.max()))
-    n_pushed = np.count_nonzero(arms.pushed)
-    yield Text(
-        f"The {counted(len(arms.x), 'steady arm')} pull the wires at rest with "
-        f"{low if low == high else f'{low} to {high}'} N"
-        + (f"; {n_pushed} of them are pushed, with a negative force." if n_pushed else ".")
-    )
+    if arms.x.size:  # a line of one span has no arms
+        low, high = (number(float(end)) for end in (arms.tension.min(), arms.tension.max()))
+        n_pushed = np.count_nonzero(arms.pushed)
+        yield Text(
+            f"The {counted(len(arms.x), 'steady arm')} pull the wires at rest with "
+            f"{low if low == high else f'{low} to {high}'} N"
+            + (f"; {n_pushed} of them are pushed, with a negative force." if n_pushed else ".")
+        )
     if not results.has_static("contact_y"):
         return
     first, last = results.line("running_range")

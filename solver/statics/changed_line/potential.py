@@ -152,13 +152,13 @@ class _Wire:
         self._linear = bending[:, None, None] * bent + self._tension[:, None, None] * self._taut
         other_bending = (bending - before.left_of(ends)[1])[:, None, None] * bent
         self._other_bending = other_bending if other_bending.any() else None
-        self._curved = np.zeros((len(pairs), 4))
         self._planes = []
-        for number, (plane, course, slope) in enumerate(known.planes()):
+        for plane, course, slope in known.planes():
             dofs, _ = wire_elements(model, wire.name, plane)
             self._planes.append((dofs, shape_of(course, slope, pairs)))
-            if number:
-                self._curved = curve_rows(model, wire.name)
+        # Without lateral motion no curve acts.
+        lateral = len(self._planes) > 1
+        self._curved = curve_rows(model, wire.name) if lateral else (np.zeros((len(pairs), 4)),)
         self._along = model.dofs(pairs, "u") if "u" in model.unknowns else None
         self._had = known.gained_tension.get(wire.name, np.zeros(len(pairs)))
         if self._along is not None:
@@ -199,7 +199,7 @@ class _Wire:
     def _rows(self, plane: int, shape: np.ndarray) -> np.ndarray:
         """Derivatives of the mean strain by the unknowns of a plane in a shape, (n, 4)."""
         rows = np.einsum("nij,nj->ni", self._taut, shape) / self._length[:, None]
-        return rows + self._curved if plane else rows
+        return np.asarray(rows + self._curved[plane])
 
 
 class _Arms:

@@ -25,6 +25,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.wire_ends import WireEnd, tensioned_ends
+from catenary.solver.statics.changed_line.changed_ends import NO_ENDS, ends_that_follow
 from catenary.solver.statics.changed_line.potential import Potential
 
 # Displacements change by less than this where Newton's method ends [m].
@@ -32,6 +33,8 @@ _SETTLED = 1e-9
 _MOST_STEPS = 40
 # A step that moves a line by more goes nowhere [m].
 _FARTHEST = 1e3
+# Turns of ends that follow, at most.
+_MOST_TURNS = 40
 # Steps at first in which droppers switch as they are, where matrices depend on the shape.
 _SWITCHING = 12
 # Passes in which all switch at once, before one at a time does, and the most after these.
@@ -156,9 +159,21 @@ class RestNearby:
         if model.simulated.tensioner is not None and not ends_stay:
             self._ends = [TensionedEnd(model, end) for end in tensioned_ends(model)]
         self._bends = effects.needs_form(model.problem)
-        self._stiff = stiff
         self._lost = 1.0 - model.simulated.kept_ratio if model.simulated.slackening else 0.0
         self._switches = ~model.broken & (self._lost > 0.0)
+        self._follow = NO_ENDS
+        if any(model.simulated.goes_on):
+            self._follow = ends_that_follow(model, self._first_loads())
+        # Ends that follow are held in each turn, which they are not by other lines.
+        self._stiff = None if self._follow.ends.size else stiff
+
+    def _first_loads(self) -> np.ndarray:
+        """What the line lacks to be at rest where the former one was, (n_dofs,) [N], [N m]."""
+        potential = self._potential
+        form = potential.form(np.zeros(self._model.n_dofs))
+        reserve = form.dropper_force
+        carried = self._carried(reserve, self._switches & (reserve < 0.0))
+        return self._load - potential.pull(np.zeros(self._model.n_dofs), form, carried)
 
     def find(self) -> Rest:
         """The rest.
@@ -168,11 +183,32 @@ class RestNearby:
         InputError
             If there is none.
         """
+        potential = self._potential
+        moved = np.zeros(self._model.n_dofs)
+        slack = self._switches & (potential.reserve(potential.known) < -_NO_FORCE)
+        ends, before = self._follow, np.inf
+        for _ in range(_MOST_TURNS):
+            rest = self._find(moved, slack)
+            if not ends.ends.size:
+                return rest
+            change = float(np.abs(rest.moved[ends.masts] - moved[ends.ends]).max())
+            if ends.has_settled(change, before):
+                return rest
+            before, moved = change, rest.moved.copy()
+            moved[ends.ends] = moved[ends.masts]
+            slack = rest.gap > 0.0
+        raise InputError(
+            "the line at rest does not settle where line.ends says that it is periodic: its end "
+            f"still moves by {1e3 * change:.2g} mm when it moves as the span before; end it "
+            "otherwise"
+        )
+
+    def _find(self, moved: np.ndarray, slack: np.ndarray) -> Rest:
+        """The rest near a displacement, from droppers that are slack there, with ends that follow
+        where they are."""
         model, potential = self._model, self._potential
         n = model.broken.size
         switches = self._switches
-        slack = switches & (potential.reserve(potential.known) < -_NO_FORCE)
-        moved = np.zeros(model.n_dofs)
         for again in itertools.count():
             moved, form, slack = self._newton(moved, slack)
             reserve = form.dropper_force
@@ -208,6 +244,7 @@ class RestNearby:
         model, potential, moved = self._model, self._potential, moved.copy()
         free = [end.unknown for end in self._ends if end.pull is not None]
         held = [end.unknown for end in self._ends if end.pull is None]
+        held += self._follow.ends.tolist()
         constrained = np.union1d(np.setdiff1d(model.constrained, free), held).astype(np.int64)
         load = self._load.copy()
         for end in self._ends:
@@ -226,11 +263,11 @@ class RestNearby:
             carried = self._carried(form.dropper_force, slack)
             lacks = load - potential.pull(moved, form, carried)
             lacks[constrained] = 0.0
-            about = model
+            about = replace(model, constrained=constrained) if self._follow.ends.size else model
             if self._bends:
                 shape = replace(form, dropper_force=carried)
                 about = build(
-                    model.problem,
+                    self._follow.held(model.problem),
                     model.mesh,
                     model.dropper_lengths,
                     model.broken,

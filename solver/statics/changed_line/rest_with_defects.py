@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from catenary.base.errors import InputError
@@ -53,8 +55,14 @@ def hang(
         stiff = None
     load = dead_loads(model) - dead_loads(cut)
     rest = RestNearby(potential, load, stiff=stiff).find()
+    if model.simulated.uplift_stops:
+        arms = mesh.steady_arms
+        rest = rest._replace(
+            form=replace(rest.form, arm_raised=rest.form.height[arms] - form.height[arms])
+        )
     _refuse_slack_wires(model, rest.form)
-    if not (effects.needs_form(problem) or model.droppers_bend or rest.gap.any()):
+    moved_stops = rest.form.arm_raised.any()
+    if not (effects.needs_form(problem) or model.droppers_bend or rest.gap.any() or moved_stops):
         model.form = rest.form
         assert model.droppers is not None
         if all(map(np.array_equal, dropper_directions(model), model.droppers.direction)):

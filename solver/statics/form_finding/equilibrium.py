@@ -26,7 +26,6 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length, hang
 from catenary.solver.statics.form_finding.lateral_equilibrium import lateral_shape
-from catenary.solver.statics.form_finding.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.form_finding.sparse_sum import (
     BandedFactors,
     Part,
@@ -34,7 +33,8 @@ from catenary.solver.statics.form_finding.sparse_sum import (
     columns_of,
     wire_parts,
 )
-from catenary.solver.statics.rest_loads import dead_loads, exact_moments
+from catenary.solver.statics.repeated_ends import repeated_ends, settled
+from catenary.solver.statics.rest_loads import curve_load, dead_loads, exact_moments
 
 # Lengths are printed to a tenth of a millimetre; the iteration contracts by the ratio of dropper
 # weight to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in forces.
@@ -237,7 +237,7 @@ class _HangingWires:
         under what arms lift of their own in the lateral plane."""
         mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
         load = self._spring_load - self._factor.from_given
-        dead = dead_loads(model)
+        dead = dead_loads(model) + curve_load(model)
         if self.moments is not None:
             dead += self.moments
         load[self._w] += dead[model.dofs(every)]

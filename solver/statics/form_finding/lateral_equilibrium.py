@@ -14,13 +14,13 @@ from catenary.base.errors import InputError
 from catenary.meshgen.hardware import SteadyArms
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium, LateralShape
-from catenary.solver.statics.form_finding.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.form_finding.sparse_sum import (
     clamp_parts,
     springs_between,
     summed,
     wire_parts,
 )
+from catenary.solver.statics.repeated_ends import repeated_ends, settled
 from catenary.solver.statics.rest_loads import curve_load, dead_loads
 
 # An arm that hangs freely carries its weight up to this inclination, the wire what is beyond [rad].

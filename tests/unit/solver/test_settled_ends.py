@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from catenary import InputError
-from catenary.solver.statics.form_finding.repeated_ends import settled
+from catenary.solver.statics.repeated_ends import settled
 
 REST = np.array([7.5, -0.3])
 
