@@ -160,11 +160,18 @@ def test_a_force_that_moves_is_seen_on_its_course(tmp_path: Path) -> None:
             # The scene's own cadence.
             again = waves_seen(data, snapshots)
             assert np.diff(snapshots.times) == pytest.approx(0.1)
+            options = FilmOptions(start=0.2, end=0.3)
+            made = animate.Pictures(results, Scenery(data, snapshots), snapshots, options)
+            next(iter(made))
     assert isinstance(data.excitation, MovingForce)
     np.testing.assert_allclose(data.position[:, 0], 130.0 + data.speed * data.time)
     np.testing.assert_allclose(data.force[:, 0], data.excitation.value(data.time))
     np.testing.assert_allclose(again.position[:, 0], data.excitation.place(again.time))
     assert np.abs(seen.uplift).max() > 1e-3
+    # After 0.4 of a period it pulls the wire down, and so does its arrow.
+    assert data.force[data.row_at(0.2), 0] < 0.0
+    begin, tip = made.drawing._arrows.get_segments()[0]
+    assert tip[1] < begin[1]
 
 
 def test_facts_of_an_excitation_are_checked_when_they_are_read() -> None:
