@@ -168,21 +168,23 @@ def _frequency(time: np.ndarray, signal: np.ndarray) -> float:
     return best
 
 
-def test_a_standing_wave_keeps_its_energy() -> None:
-    """T k^2 A^2 L / 4 at all times, of one wire; snapshots dt apart take (w dt)^2 / 4 of it and
-    (w dt)^2 / 12 in turn."""
+@pytest.mark.parametrize("axis", [1, 2])
+def test_a_standing_wave_keeps_its_energy(axis: int) -> None:
+    """T k^2 A^2 L / 4 at all times, of one wire, also across the track; snapshots dt apart take
+    (w dt)^2 / 4 of it and (w dt)^2 / 12 in turn."""
     length, dt, amplitude = 100.0, 0.01, 0.02
     wire = replace(EN_CONTACT_WIRE, bending_stiffness=1e-3)
     line = bare_wires(length, contact_wire=wire)
-    rest = line_at_rest(problem_of(line, BARE), mesh_of(line, 100))
+    effects = BARE | ({"lateral_motion"} if axis == 1 else set())
+    rest = line_at_rest(problem_of(line, effects), mesh_of(line, 100))
     nodes = rest.mesh.wires[CONTACT_WIRE]
     k = 4 * np.pi / length
     omega = SPEED * k
     energy = EnergyMotion(rest)
     for time in (dt * np.arange(60)).tolist():
-        uplift = np.zeros(rest.mesh.n_nodes)
-        uplift[nodes] = amplitude * np.sin(k * rest.mesh.x(nodes)) * np.cos(omega * time)
-        energy.add(time, uplift)
+        moved = np.zeros((rest.mesh.n_nodes, 3))
+        moved[nodes, axis] = amplitude * np.sin(k * rest.mesh.x(nodes)) * np.cos(omega * time)
+        energy.add(time, moved)
     seen = energy.seen()
     expected = EN_CONTACT_WIRE.tension * k**2 * amplitude**2 * length / 4
     within = ((omega * dt) ** 2 / 4 + 1e-4) * expected
@@ -198,10 +200,10 @@ def test_slack_droppers_hold_what_their_weights_do() -> None:
     line = en50318_line(5)
     rest = line_at_rest(problem_of(line, WHOLE), mesh_of(line, 2))
     energy, lift = EnergyMotion(rest), 0.3
-    uplift = np.zeros(rest.mesh.n_nodes)
-    uplift[rest.mesh.wires[CONTACT_WIRE]] = lift
+    moved = np.zeros((rest.mesh.n_nodes, 3))
+    moved[rest.mesh.wires[CONTACT_WIRE], 2] = lift
     for time in (0.0, 1.0):
-        energy.add(time, uplift)
+        energy.add(time, moved)
     tension, k = rest.form.dropper_force, rest.model.dropper_stiffness
     arms = 0.5 * line.steady_arm.stiffness * lift**2 * rest.mesh.steady_arms.size
     h, wire = 2.5, EN_CONTACT_WIRE
