@@ -43,6 +43,7 @@ from catenary.cases.studies.waves.theory import (
     row_of,
     wave_theory,
 )
+from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.film.film_data import film_data
@@ -159,10 +160,18 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
     Raises
     ------
     InputError
-        If the folder holds such a table and ``force`` is not given.
+        If the folder holds such a table and ``force`` is not given, or if a wire is carried by its
+        bending.
     """
     refuse_table(folder / OBSTACLES, force)
     problem = problem_of(scene)
+    for wire in problem.line.wires:
+        if bends(slowest_wave_of(problem.line, wire), wire.tension, wire.mass_per_length):
+            raise InputError(
+                f"--obstacles measures wires under tension; {wire.name} carries waves by bending, "
+                "whose speeds are too different for a window in time to part what comes from what "
+                "goes back"
+            )
     rest = line_at_rest(problem, mesh_of(scene))
     results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
     lines = [
