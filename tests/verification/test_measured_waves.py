@@ -24,7 +24,7 @@ from small_lines import (
 
 from catenary.cases.studies.waves.excited import Settings, Watch, excitation_of, without_train
 from catenary.cases.studies.waves.measured import arrived, measured_rows, transmitted
-from catenary.cases.studies.waves.seen import EnergyMotion, NodeMotion, WireMotion
+from catenary.cases.studies.waves.seen import EnergyMotion, EnergySeen, NodeMotion, WireMotion
 from catenary.cases.studies.waves.study import study_excited
 from catenary.cases.studies.waves.theory import wave_theory
 from catenary.mbs.lumped_data import LumpedData
@@ -212,6 +212,14 @@ def test_a_standing_wave_keeps_its_energy(axis: int) -> None:
     before, _, beyond = seen.parts(np.full((seen.time.size, 1), 50.0))
     # The node in the middle counts on one side: its share of the energy is 1e-2 sin^2(k h / 2).
     np.testing.assert_allclose(before, beyond, rtol=2e-4)
+
+
+@pytest.mark.parametrize(("end", "left"), [(0.0, 0), (0.2, 2), (0.29, 2), (0.3, 3)])
+def test_energies_between_snapshots_end_with_the_last_one_before_a_change(
+    end: float, left: int
+) -> None:
+    seen = EnergySeen(np.array([0.05, 0.15, 0.25]), np.zeros(1), np.ones((3, 1)))
+    assert seen.until(end).total.size == left
 
 
 def test_slack_droppers_hold_what_their_weights_do() -> None:

@@ -201,7 +201,7 @@ def _write(
     """Text, and pictures of the waves that are seen, and tables with theory beside them."""
     moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
     until = min((incident.time for incident in rest.model.simulated.incidents), default=np.inf)
-    if until < np.inf:
+    if until < energy.time[-1]:
         energy = energy.until(until)
         remarks = [*remarks, f"Energies end at {until:g} s, when an incident changes the line."]
     reflections, spectra = reflections_of(rest), transmitted(theory, seen)
