@@ -6,16 +6,38 @@ of rail. Which wires a line has is decided by its topology (``catenary.meshgen.t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from catenary.meshgen.hardware import Clamps, Droppers, Fittings, SteadyArms, Supports
 from catenary.meshgen.track import Curve, Spans, read_only
 from catenary.meshgen.wires import SAME_PLACE, End, Profile, Role, Wire
+
+
+class DropperPlace(NamedTuple):
+    """Lower end of a dropper along the track [m], and which one it is, from 0, of those that twin
+    wires, or the wires of two tension sections, have there."""
+
+    x: float
+    nth: int = 0
+
+
+def droppers_at(x: np.ndarray, places: Sequence[DropperPlace]) -> np.ndarray:
+    """Numbers of the droppers that stand nearest to places, (n_places,) int.
+
+    ``x`` are the lower ends of all droppers, (n_droppers,) [m], in the order of a mesh.
+    """
+    found = np.zeros(len(places) if x.size else 0, dtype=np.int64)
+    for number, (place, nth) in enumerate(places[: found.size]):
+        away = np.abs(x - place)
+        there = np.flatnonzero(away <= away.min() + SAME_PLACE)
+        found[number] = there[min(nth, there.size - 1)]
+    return found
 
 
 @dataclass(frozen=True)
@@ -109,6 +131,11 @@ class Line(Spans):
         masts, x = self.support_positions, self.dropper_x
         first = np.searchsorted(x, masts[span], side="right")
         return x[first : np.searchsorted(x, masts[span + 1])]
+
+    def dropper_of_span(self, span: int, number: int) -> DropperPlace:
+        """Place of a dropper by its number in a span; both count from 1."""
+        x = self.droppers_of_span(span - 1)[:number]
+        return DropperPlace(float(x[-1]), int((x[-1] - x[:-1] <= SAME_PLACE).sum()))
 
     @property
     def numbered_droppers(self) -> dict[tuple[int, int], float]:

@@ -97,6 +97,7 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 class _Sentence(TypedDict):
     says: str
     at_m: NotRequired[Number]
+    nth: NotRequired[Annotated[int, Field(ge=0)]]
 
 
 class _Incident(_Sentence):

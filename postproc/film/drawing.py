@@ -289,7 +289,7 @@ class Drawing:
         arrows = []
         tops = seen(*beside[drawn.FORCES], eye)
         for force, at, text in zip(data.force[row].tolist(), tops, self.values, strict=True):
-            arrow = self._arrow(max(force, 0.0)) + at
+            arrow = self._arrow(force) + at
             arrows.append(arrow)
             text.set_text(f"{force:.0f} N")
             top = float(arrow[..., 1].max())
@@ -304,7 +304,7 @@ class Drawing:
     def _arrow(self, force: float) -> np.ndarray:
         """Stem and tip of the arrow of a force, (3, 2, 2); from above a cross."""
         if self._picture.view is View.PLAN:
-            half = 0.6 * float(force > 0.0)
+            half = 0.6 * float(force != 0.0)
             return half * np.array([[[-1, -1], [1, 1]], [[-1, 1], [1, -1]], [[0, 0], [0, 0]]])
         size = self._projection.scale.size
         length = _ARROW * size * room_above(self._scenery.data) * force

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.meshgen.line import DropperPlace, droppers_at
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.line_of_run import ContactProfile
 from catenary.postproc.read.results import Results
@@ -162,7 +163,8 @@ def _gone(results: Results, x: np.ndarray) -> np.ndarray:
     for fact in (*results.attributes.get("defects", []), *results.attributes.get("incidents", [])):
         # Files of earlier versions do not say where a dropper breaks.
         if fact.get("type") in _GONE and "at_m" in fact and x.size:
-            gone[int(np.argmin(np.abs(x - fact["at_m"])))] = fact.get("time_s", -np.inf)
+            place = DropperPlace(fact["at_m"], int(fact.get("nth", 0)))
+            gone[droppers_at(x, [place])] = fact.get("time_s", -np.inf)
     return gone
 
 

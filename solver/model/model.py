@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.meshgen.hardware import Slopes
+from catenary.meshgen.line import DropperPlace, droppers_at
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.model.alike import alike
@@ -245,11 +246,9 @@ class Model:
     def dropper_stiffness(self) -> np.ndarray:
         return np.where(self.broken, 0.0, self.dropper_pieces.slope)
 
-    def droppers_at(self, places: Sequence[float]) -> np.ndarray:
-        """Numbers of the droppers that stand nearest to places [m], (n_places,) int."""
-        x = self.mesh.x(self.mesh.droppers[:, 1])
-        away = np.abs(x[:, None] - np.reshape(places, (1, -1)))
-        return away.argmin(axis=0) if x.size else np.zeros(0, dtype=np.int64)
+    def droppers_at(self, places: Sequence[DropperPlace]) -> np.ndarray:
+        """Numbers of the droppers that stand nearest to places, (n_places,) int."""
+        return droppers_at(self.mesh.x(self.mesh.droppers[:, 1]), places)
 
     @property
     def dropper_damping(self) -> np.ndarray:

@@ -7,19 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from catenary.meshgen.line import DropperPlace
+
 
 @dataclass(frozen=True)
 class MissingDropper:
-    """The dropper at ``x`` [m] is not there, nor are its clamps."""
+    """The dropper at a place is not there, nor are its clamps."""
 
-    x: float
+    place: DropperPlace
 
 
 @dataclass(frozen=True)
 class LooseClamp:
-    """A clamp of the dropper at ``x`` [m] slips: it carries nothing; all masses stay."""
+    """A clamp of the dropper at a place slips: it carries nothing; all masses stay."""
 
-    x: float
+    place: DropperPlace
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from catenary.meshgen.line import DropperPlace
+
 
 @dataclass(frozen=True)
 class DropperBreak:
-    """From ``time`` [s] on the dropper at ``x`` [m] carries nothing."""
+    """From ``time`` [s] on the dropper at a place carries nothing."""
 
     time: float
-    x: float
+    place: DropperPlace
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from catenary.mbs.vehicle.irregularity import sines
+from catenary.meshgen.line import DropperPlace
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -186,13 +187,13 @@ class LengthErrors:
     deviation : standard deviation of the normal distribution before it is cut off [m]
     cut_off : at how many standard deviations
     seed : the same seed gives the same errors
-    given : pairs of place and error of single droppers, which come on top [m]
+    given : pairs of place and error [m] of single droppers, which come on top
     """
 
     deviation: float
     cut_off: float
     seed: int
-    given: tuple[tuple[float, float], ...] = ()
+    given: tuple[tuple[DropperPlace, float], ...] = ()
 
     def of(self, n: int) -> np.ndarray:
         """Random errors of ``n`` droppers in their order along the track, (n,) [m]."""

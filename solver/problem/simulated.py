@@ -9,6 +9,7 @@ import numpy as np
 
 from catenary.mbs.vehicle.base_motion import VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.wires import Profile, Role, Wire
 from catenary.solver.problem.contact_laws import ContactLaw
 from catenary.solver.problem.ends import Tensioner
@@ -57,7 +58,7 @@ class Simulated:
     uplift_stops : whether stops end the uplift at steady arms
     irregular_heights : added to the heights of contact wires at rest where they are held
     length_errors : of the droppers, None if all are cut to length
-    missing, loose : places of droppers that are not there, and of those that carry nothing [m]
+    missing, loose : places of droppers that are not there, and of those that carry nothing
     surface : running surfaces above the axes of the contact wires, each adding to the others
     """
 
@@ -88,8 +89,8 @@ class Simulated:
     uplift_stops: bool = False
     irregular_heights: Heights | None = None
     length_errors: LengthErrors | None = None
-    missing: tuple[float, ...] = ()
-    loose: tuple[float, ...] = ()
+    missing: tuple[DropperPlace, ...] = ()
+    loose: tuple[DropperPlace, ...] = ()
     surface: tuple[Surface, ...] = ()
 
     def target_height(self, wire: Wire, x: np.ndarray) -> np.ndarray:

@@ -10,13 +10,15 @@ is only that of absorbing layers, unless that of the line is included in both.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import linalg
 
 from catenary.base.errors import InputError
 from catenary.solver.ends.half_lines import Chain, chain_at, half_lines
-from catenary.solver.ends.line_beyond import END, shared_at, sideways, span_between
+from catenary.solver.ends.line_beyond import END, START, shared_at, sideways, span_between
 from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AbsorbingLayer, Periodic
 
@@ -84,7 +86,7 @@ def end_reflection(model: Model, side: int, frequency: np.ndarray) -> EndReflect
     if isinstance(end, Periodic):
         answer = after
     else:
-        answer = _held(whole, model, side, masts[: n_end + 1], weights) * signs[:, None] * signs
+        answer = _held(whole, model, side, masts[: n_end + 2], weights) * signs[:, None] * signs
     fading = _GROWTH + 0.5 * (damping.beta + damping.alpha * np.abs(s) ** 2)
     length = fading * abs(masts[n_end + 1] - masts[n_end])
     return _reflection(frequency, incoming, after, before, answer, length)
@@ -124,31 +126,50 @@ def _chain(
 def _held(
     whole: Model, model: Model, side: int, masts: np.ndarray, weights: np.ndarray
 ) -> np.ndarray:
-    """Dynamic stiffness (n, m, m) at the last of ``masts``, which are from the end inwards, of the
-    spans between them; held at the first."""
+    """Dynamic stiffness (n, m, m) at the last but one of ``masts``, which are from the end inwards,
+    of the spans between them; held at the first. The last one is that of the span before."""
     unknowns = _unknowns_at(whole, side, masts)
-    free = np.flatnonzero(~np.isin(unknowns[0], model.constrained))
-    answer = _at(whole, unknowns[0], weights)[:, free][:, :, free]
-    for number in range(1, len(masts)):
+    answer = _last_span(whole, model, side, unknowns[0], weights)
+    for number in range(2, len(masts) - 1):
         chain = _chain(whole, masts[number], masts[number - 1], weights)
-        joined = chain.next[:, :, free]
-        outer = answer - chain.end[:, free][:, :, free]
-        answer = _at(whole, unknowns[number], weights) - chain.start
-        answer = answer - joined @ np.linalg.solve(outer, np.swapaxes(joined, 1, 2))
-        free = np.arange(unknowns[number].size)
+        outer = answer - chain.end
+        answer = _at(whole, unknowns[number - 1], weights) - chain.start
+        joined = np.linalg.solve(outer, np.swapaxes(chain.next, 1, 2))
+        answer = answer - chain.next @ joined
+    return answer
+
+
+def _last_span(
+    whole: Model, model: Model, side: int, shared: np.ndarray, weights: np.ndarray
+) -> np.ndarray:
+    """Dynamic stiffness (n, m, m) of the last span at the unknowns that it shares with the one
+    before; some wires, such as stitch wires, may not reach into it."""
+    beyond = np.arange(shared[0]) if side == START else np.arange(shared[0], whole.numbering.size)
+    beyond = np.setdiff1d(beyond, [*shared, *model.constrained])
+    every = np.union1d(shared, beyond)
+    parts = shared_at(whole, every)
+    inner, outer = np.isin(every, beyond), np.isin(every, shared)
+    row, column = np.nonzero(parts[:, inner][:, :, inner].any(axis=0))
+    width = int(np.abs(row - column).max())
+    bands = np.zeros((len(parts), 2 * width + 1, beyond.size))
+    bands[:, width + row - column, column] = parts[:, inner][:, :, inner][:, row, column]
+    joins = parts[:, inner][:, :, outer]
+    answer = _at(whole, shared, weights)
+    for number, weight in enumerate(weights):
+        banded, right = (np.tensordot(weight, part, 1) for part in (bands, joins))
+        answer[number] -= right.T @ linalg.solve_banded((width, width), banded, right)
     return answer
 
 
 def _unknowns_at(model: Model, side: int, masts: np.ndarray) -> list[np.ndarray]:
-    """Unknowns that spans share at each mast, from the end inwards."""
-    inner = np.sort(masts)
-    found = [
-        span_between(model, low, high)[0] for low, high in zip(inner[:-1], inner[1:], strict=True)
-    ]
-    # The last mast along the track begins no span: its unknowns stand as at the one before.
-    starts = [model.numbering.first_at(x) for x in inner[-2:]]
-    found.append(found[-1] - starts[0] + starts[1])
-    return found[::-1] if side == END else found
+    """Unknowns that spans share at each mast but the first and the last, which are from the end
+    inwards: those at the mast inwards are alike."""
+    found = []
+    for mast, inner in itertools.pairwise(masts[1:]):
+        unknowns, _ = span_between(model, *sorted((mast, inner)))
+        away = model.numbering.first_at(mast) - model.numbering.first_at(inner)
+        found.append(unknowns + (away if side == END else 0))
+    return found
 
 
 def _at(model: Model, unknowns: np.ndarray, weights: np.ndarray) -> np.ndarray:

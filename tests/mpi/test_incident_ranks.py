@@ -19,6 +19,7 @@ from studies import few
 
 from catenary.base.parallel import on_root
 from catenary.mbs.lowering import Lowering
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.model.partition import distribute
@@ -111,7 +112,7 @@ def case() -> tuple[Problem, LineMesh, float]:
 def incidents(at_cut: float, share: float = 1.0) -> tuple[LineIncident, ...]:
     """At a ``share`` of the usual times."""
     return (
-        DropperBreak(0.5 * share, at_cut),
+        DropperBreak(0.5 * share, DropperPlace(at_cut)),
         TensionLoss(0.7 * share, CONTACT_WIRE, 0.8),
         TensionLoss(0.9 * share, "messenger_wire", 0.9),
     )

@@ -13,6 +13,7 @@ from rank_histories import check_ranks
 from scenes import load_scene, mesh_of, problem_of
 
 from catenary.base.parallel import on_root
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
@@ -58,7 +59,7 @@ def test_loads_in_time_on_all_ranks() -> None:
     problem = problem_of(scene)
     effects = problem.effects | {"loads", "dropper_break"}
     mesh = on_root(WORLD, lambda: mesh_of(scene))
-    changed = {"effects": effects, "incidents": (DropperBreak(0.2, 180.0),)}
+    changed = {"effects": effects, "incidents": (DropperBreak(0.2, DropperPlace(180.0)),)}
     problem = problem.__class__(**{**problem.__dict__, **changed})
     with registered(Effect("loads", "loads", "loads", "test", False, build=blow)):
         rest = line_at_rest_on_all(problem, mesh, WORLD)

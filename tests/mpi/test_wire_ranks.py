@@ -9,6 +9,7 @@ from mpi4py import MPI
 from rank_histories import on_one
 from small_lines import WHOLE, mesh_of, problem_of, train
 
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
@@ -57,7 +58,7 @@ def test_lines_of_three_wires_march_the_same_on_any_number_of_ranks(topology: st
         line,
         WHOLE | INCIDENTS,
         train=train(80.0, mast - 40.0, mast + 20.0, static_force=250.0, raise_time=0.1),
-        incidents=(TensionLoss(0.2, wire, 0.8), DropperBreak(0.3, first)),
+        incidents=(TensionLoss(0.2, wire, 0.8), DropperBreak(0.3, DropperPlace(first))),
     )
     rest = line_at_rest(problem, mesh_of(line, 2))
     together, alone = run(COMM, rest), on_one(lambda comm: run(comm, rest))

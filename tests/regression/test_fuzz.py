@@ -35,7 +35,6 @@ from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories
 from catenary.solver.problem.incidents import DropperBreak
-from catenary.solver.statics.changed_line.after_incidents import dropper_at
 
 pytestmark = pytest.mark.study
 
@@ -277,7 +276,7 @@ def switches_by_itself(rest: hard_runs.AtRest, run: RunHistories) -> bool:
     for incident in rest.problem.incidents:
         if isinstance(incident, DropperBreak) and "dropper_break" in rest.problem.effects:
             step = round(incident.time / rest.problem.numerics.dt)
-            switched[step:, dropper_at(rest.model, incident.x)] = False
+            switched[step:, rest.model.droppers_at([incident.place])] = False
     return bool(switched.any())
 
 

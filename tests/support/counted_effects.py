@@ -17,6 +17,7 @@ from catenary.mbs.lowering import Lowering
 from catenary.mbs.vehicle.base_motion import Harmonic, VehicleMotion
 from catenary.mbs.vehicle.suspension import Vehicle
 from catenary.meshgen.hardware import Fittings
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
@@ -41,8 +42,8 @@ WIND = Wind(25.0, gusts=Gusts(2.0))
 CAR = Vehicle(3e4, 2e6, 9e5, 4e4, 19.0, 2.5)
 INSULATORS = Fittings("section_insulator", CONTACT_WIRE, (100.3, 101.7), (5.0, 5.0))
 DEFECTS = (
-    MissingDropper(88.25),
-    LooseClamp(137.5),
+    MissingDropper(DropperPlace(88.25)),
+    LooseClamp(DropperPlace(137.5)),
     WornWire(CONTACT_WIRE, 60.0, 80.0, 0.2),
     WrongTension(CONTACT_WIRE, 1.05),
     HardSpot(CONTACT_WIRE, 120.2, 5.0, 300.0),
@@ -91,7 +92,7 @@ def full_problem(names: frozenset[str]) -> Problem:
             placements=(lowered, *ours.placements[1:]),
         ),
         residual_stiffness_ratio=0.01,
-        incidents=(DropperBreak(0.5, 80.0), TensionLoss(0.6, MESSENGER_WIRE, 0.9)),
+        incidents=(DropperBreak(0.5, DropperPlace(80.0)), TensionLoss(0.6, MESSENGER_WIRE, 0.9)),
         irregularities=Irregularities(heights, heights, LengthErrors(0.001, 2.0, 1)),
         defects=DEFECTS,
         wind=WIND,

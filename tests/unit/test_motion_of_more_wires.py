@@ -19,7 +19,7 @@ from scipy.sparse import linalg as sparse_linalg
 from small_lines import WHOLE, mesh_of, numerics, problem_of, train
 from static_line import absolute_rest, first_rest
 
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import DropperPlace, Line
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
@@ -109,7 +109,7 @@ def test_a_wire_that_loses_tension_and_a_dropper_that_breaks_lead_to_a_new_rest(
     model, form = find_form(problem_on(line), mesh)
     places = mesh.x(mesh.droppers[:, 1])
     number = int(np.flatnonzero(mesh.dropper_group == 1)[0])
-    happened = (TensionLoss(0.1, wire, 0.9), DropperBreak(0.2, float(places[number])))
+    happened = (TensionLoss(0.1, wire, 0.9), DropperBreak(0.2, DropperPlace(float(places[number]))))
     after = changed_line(model, form, happened)
     moved = solve_free(matrix_of(after.model, stiffness=1.0), after.model, after.load)
     tensions = {own.name: own.tension for own in line.wires}

@@ -10,6 +10,7 @@ from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of, recorde
 import catenary
 from catenary.cases.run.describe.defects import defect_facts
 from catenary.meshgen.hardware import Fittings
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.effects import all_effects
 from catenary.solver.problem.defects import (
@@ -46,8 +47,8 @@ def test_defects_are_converted() -> None:
     problem = problem_of(scene())
     # Spans of 60 m, the first dropper at 5 m, the third at 17 m, the fourth at 23.5 m.
     assert problem.defects == (
-        MissingDropper(4 * 60.0 + 17.0),
-        LooseClamp(5 * 60.0 + 5.0),
+        MissingDropper(DropperPlace(4 * 60.0 + 17.0)),
+        LooseClamp(DropperPlace(5 * 60.0 + 5.0)),
         WornWire("contact_wire", 400.0, 460.0, 0.2),
         WrongTension("messenger_wire", 0.9),
         HardSpot("contact_wire", 500.0, 5.0, 0.0),
@@ -57,7 +58,9 @@ def test_defects_are_converted() -> None:
     assert irregular.heights == Heights((0.0, 1320.0), HeightSpectrum(0.01, 2.0, 12.0, 120.0, 1))
     table = ((100.0, 0.0), (110.0, -0.001), (120.0, 0.0))
     assert irregular.surface == Heights((0.0, 1320.0), None, table)
-    assert irregular.lengths == LengthErrors(0.002, 2.5, 1, ((6 * 60.0 + 23.5, -0.01),))
+    assert irregular.lengths == LengthErrors(
+        0.002, 2.5, 1, ((DropperPlace(6 * 60.0 + 23.5), -0.01),)
+    )
     assert problem.line.fittings == (
         Fittings("section_insulator", "contact_wire", (600.0, 601.6), (6.0, 6.0)),
     )

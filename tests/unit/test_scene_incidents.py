@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from scenes import Scene, load_scene, problem_of, recorded, with_words
 
 import catenary
 from catenary import InputError
 from catenary.cases.run.describe.defects import incident_facts
+from catenary.cases.run.scene_mesh import mesh_of
 from catenary.mbs.lowering import Lowering
+from catenary.meshgen.line import DropperPlace
 from catenary.solver.problem.incidents import DropperBreak, TensionLoss
+from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length
+from catenary.solver.statics.line_at_rest import line_at_rest
 
 INCIDENTS = (
     "incidents=[{type='lowering',at_s=3.0004,force_N=-75.0,drop_m=0.25},"
@@ -27,7 +32,7 @@ def test_incidents_are_converted_and_rounded_to_steps() -> None:
     problem = problem_of(scene())
     # Spans of 60 m, the third dropper at 17 m.
     assert problem.incidents == (
-        DropperBreak(2.0, 4 * 60.0 + 17.0),
+        DropperBreak(2.0, DropperPlace(4 * 60.0 + 17.0)),
         TensionLoss(2.5, "messenger_wire", 0.8),
     )
     assert problem.train.placements[0].lowering == Lowering(3.0, -75.0, 0.2, 0.25)
@@ -46,7 +51,7 @@ def test_a_resolved_scene_is_the_same_again() -> None:
 
 
 def test_one_key_of_an_incident_is_changed() -> None:
-    assert problem_of(scene("incidents.1.dropper=9")).incidents[0].x == 4 * 60.0 + 55.0
+    assert problem_of(scene("incidents.1.dropper=9")).incidents[0].place.x == 4 * 60.0 + 55.0
 
 
 def test_the_plan_tells_incidents_in_order_of_time() -> None:
@@ -97,3 +102,35 @@ def test_a_lost_tension_may_make_a_train_supercritical() -> None:
     words = "incidents=[{type='tension_loss',at_s=2.0,wire='contact_wire',share=0.3}]"
     found = with_words("en50318_2002", [words, "effects.supercritical_speed=true"])
     assert catenary.plan(found).effects.simulated["supercritical_speed"] is True
+
+
+@pytest.mark.parametrize(
+    ("case", "own", "span"),
+    [("dc_twin", ("effects.relative_motion=true",), 6), ("overlap", ("line.n_spans=30",), 15)],
+)
+def test_droppers_of_two_wires_at_one_place_have_numbers_of_their_own(
+    case: str, own: tuple[str, ...], span: int
+) -> None:
+    """Twin wires, and two tension sections side by side, have two droppers at one place: the
+    numbers 3 and 4 once meant one of them, and the other could not be named."""
+    scene_of = load_scene(case, [*own])
+    rest = line_at_rest(problem_of(scene_of), mesh_of(scene_of))
+    lower = rest.mesh.droppers[:, 1]
+    wires = []
+    for number in (3, 4):
+        both = [
+            f"incidents=[{{type='dropper_break',at_s=0.1,span={span},dropper={number}}}]",
+            f"defects=[{{type='missing_dropper',span={span},dropper={7 - number}}}]",
+            f"irregularities.dropper_lengths.by_dropper=[[{span},{number},5.0]]",
+        ]
+        changed = load_scene(case, [*own, *both])
+        problem = problem_of(changed)
+        (broken,) = rest.model.droppers_at([problem.incidents[0].place])
+        (missing,) = rest.model.droppers_at([problem.defects[0].place])
+        (longer,) = np.flatnonzero(errors_of_length(problem, rest.model))
+        assert longer == broken != missing
+        (fact,) = incident_facts(changed, problem)  # by which films leave it out
+        assert DropperPlace(fact["at_m"], fact["nth"]) == problem.incidents[0].place
+        assert rest.mesh.x(lower[broken]) == rest.mesh.x(lower[missing])
+        wires.append(next(n for n, nodes in rest.mesh.wires.items() if lower[broken] in nodes))
+    assert len(set(wires)) == 2, wires

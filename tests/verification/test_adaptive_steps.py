@@ -9,6 +9,7 @@ import pytest
 from measuring import check, march, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
 from catenary.solver.problem.incidents import DropperBreak
@@ -113,7 +114,7 @@ def test_incidents_under_short_steps(mesh: LineMesh) -> None:
     changes = {
         "contact": LinearLaw(5e4, 0.0),
         "train": train(60.0, 70.0, 94.0, raise_time=0.3),
-        "incidents": (DropperBreak(0.2, 89.5),),
+        "incidents": (DropperBreak(0.2, DropperPlace(89.5)),),
     }
     short = march(landing(numerics(DT / 4), **changes), mesh)["contact_force"][::4]
     least = numerics(DT, adaptive_tolerance=1e-9, smallest_dt=DT / 4)

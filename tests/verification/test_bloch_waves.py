@@ -124,6 +124,15 @@ def test_the_fastest_waves_of_en50318_2002() -> None:
     assert theory.amplification == pytest.approx(1.62, abs=0.01)
 
 
+def test_what_outruns_the_train_travels_at_all() -> None:
+    """Narrow stop bands, such as 6.10 to 6.12 Hz, lie in no range of frequencies that outrun."""
+    theory, _ = rest_of("en50318_2002")
+    bands = theory.bands()
+    stops = np.column_stack([bands[:-1, 1], bands[1:, 0]])
+    for low, high in theory.outrunning():
+        assert ((stops[:, 1] <= low + 1e-9) | (stops[:, 0] >= high - 1e-9)).all(), (low, high)
+
+
 def test_spans_that_differ_are_refused() -> None:
     _, rest = rest_of("en50318_2002")
     masts = rest.problem.line.support_positions

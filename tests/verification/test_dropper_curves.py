@@ -21,6 +21,7 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from studies import few
 
 from catenary.meshgen.hardware import DropperKind
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact_problem.complementarity import Signs, System, room_for
@@ -127,7 +128,11 @@ def test_a_line_with_a_loose_dropper_has_the_rest_that_root_finding_gives(name: 
     problem, mesh, model, form = at_rest(name)
     gone = 7
     place = float(mesh.x(mesh.droppers[gone, 1]))
-    hung = replace(problem, effects=problem.effects | {"loose_clamp"}, defects=(LooseClamp(place),))
+    hung = replace(
+        problem,
+        effects=problem.effects | {"loose_clamp"},
+        defects=(LooseClamp(DropperPlace(place)),),
+    )
     _, found = find_form(hung, mesh)
     law = law_of(CURVES[name], form.dropper_length)
     rest = stretch_at_rest(CURVES[name], form, form.dropper_length)

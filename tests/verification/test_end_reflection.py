@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from measuring import check
 from small_lines import BARE, bare_wires, en50318_line, mesh_of, problem_of
+from stitched_line import stitched_line
 
+from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.effects.build_model import build
 from catenary.solver.ends.line_beyond import END, START
@@ -22,7 +24,7 @@ ENDS = {"periodic_ends", "absorbing_layers", "arm_stiffness"}
 FREQUENCY = np.arange(2.0, 20.0, 0.1)
 
 
-def model_of(line: LineData, end: EndCondition, elements: int = 2, side: int = END) -> Model:
+def model_of(line: LineData | Line, end: EndCondition, elements: int = 2, side: int = END) -> Model:
     ends = (Fixed(), end) if side == END else (end, Fixed())
     problem = problem_of(line, BARE | ENDS, ends=ends)
     mesh = mesh_of(line, elements)
@@ -44,6 +46,22 @@ def test_ends_that_are_held_send_back_all_and_periodic_ones_nothing(side: int) -
     assert np.nanmin(held.reflected) > 0.93 and np.nanmax(held.reflected) < 1.0 + 1e-9
     check("of fast ones", held.of_faster(70.0)[1], 1.0, within=2e-3)
     assert np.nanmax(goes_on.reflected) < 1e-10
+
+
+@pytest.mark.parametrize("side", [START, END])
+@pytest.mark.parametrize("layer", [0, 2])
+def test_a_stitched_line_sends_back_all_at_a_held_end(layer: int, side: int) -> None:
+    """Stitch wires do not reach to the ends, so that the last span has fewer wires at one side. A
+    layer whose damping is next to nothing ends in the same span, and sends back as much."""
+    end = AbsorbingLayer(layer, 1e-9) if layer else Fixed()
+    model = model_of(stitched_line(6), end, 2, side)
+    found = end_reflection(model, side, FREQUENCY)
+    assert np.isfinite(found.reflected).any(axis=1).sum() > 0.5 * FREQUENCY.size
+    # Waves fade by exp(-1e-3 L / v), of those that outrun a train by 2 x 2 x 65 m / 70 m/s = 4e-3
+    # in the two spans of a layer at most.
+    largest, rms = found.of_faster(70.0)
+    assert largest < 1.0 + 1e-9
+    check("of fast ones", rms, 1.0, within=4e-3)
 
 
 @pytest.mark.parametrize(("n", "damping"), [(4, 3.0), (8, 1.5)])

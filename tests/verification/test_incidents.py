@@ -32,6 +32,7 @@ from static_line import absolute_rest, first_rest
 from studies import few_values
 
 from catenary.cases.studies.hard import runs as hard_runs
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.model.beam import shape_slopes
 from catenary.solver.model.model import Model
@@ -50,7 +51,7 @@ from catenary.solver.statics.line_at_rest import line_at_rest
 
 EPS = np.finfo(float).eps
 INCIDENTS = {"dropper_break", "tension_loss"}
-BREAK = DropperBreak(0.2, 90.0)
+BREAK = DropperBreak(0.2, DropperPlace(90.0))
 # Near critical for the line's slowest motion, at about 1 Hz; stiffness damps what is fast.
 STRONG = Damping(alpha=5e-3, beta=12.0)
 SETTLED = 6.0
@@ -70,7 +71,7 @@ def nobody(duration: float) -> Train:
     "incidents",
     [
         pytest.param((BREAK,), marks=pytest.mark.study),
-        (BREAK, DropperBreak(0.4, 96.5), DropperBreak(0.3, 60.0 + 5.0)),
+        (BREAK, DropperBreak(0.4, DropperPlace(96.5)), DropperBreak(0.3, DropperPlace(60.0 + 5.0))),
         (TensionLoss(0.2, CONTACT_WIRE, 0.6),),
         pytest.param((TensionLoss(0.2, MESSENGER_WIRE, 0.8),), marks=pytest.mark.study),
         (TensionLoss(0.2, CONTACT_WIRE, 0.9), BREAK, TensionLoss(0.7, CONTACT_WIRE, 0.5)),
@@ -98,7 +99,7 @@ def test_the_line_comes_to_rest_where_statics_wants_it(incidents: tuple[LineInci
         if isinstance(incident, TensionLoss):
             shares[incident.wire] = incident.share
         else:
-            broken.add(int(np.flatnonzero(np.abs(places - incident.x) < 1e-9)[0]))
+            broken.add(int(np.flatnonzero(np.abs(places - incident.place.x) < 1e-9)[0]))
     tensions = {wire: share * problem.line.wire(wire).tension for wire, share in shares.items()}
     expected = absolute_rest(model, form, tensions=tensions, broken=broken) - first_rest(
         model, form
@@ -179,7 +180,7 @@ def undamped(incidents: tuple[LineIncident, ...]) -> Problem:
 @pytest.mark.parametrize(
     "incident",
     [
-        DropperBreak(0.4, 90.0),
+        DropperBreak(0.4, DropperPlace(90.0)),
         TensionLoss(0.5, CONTACT_WIRE, 0.7),
         TensionLoss(0.5, MESSENGER_WIRE, 0.7),
     ],
@@ -195,7 +196,7 @@ def test_the_energy_that_leaves_is_what_broke_or_ran_out(incident: LineIncident)
     at = round(incident.time / problem.numerics.dt)
     seen = march(problem, mesh, lambda view: view.step == at and view.checkpoint())
     if isinstance(incident, DropperBreak):
-        number = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - incident.x)))
+        number = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - incident.place.x)))
         force = seen["dropper_force"][:, number]
         assert force[at] > 50.0 and not force[at + 1 :].any()
         released = force[at] ** 2 / (2 * problem.line.droppers[0].kind.stiffness)
@@ -226,7 +227,7 @@ def slope_energy(problem: Problem, model: Model, shape: np.ndarray, wire: str) -
 
 @pytest.mark.parametrize(
     "incident",
-    [DropperBreak(0.4, 96.5), TensionLoss(0.4, CONTACT_WIRE, 0.8)],
+    [DropperBreak(0.4, DropperPlace(96.5)), TensionLoss(0.4, CONTACT_WIRE, 0.8)],
     ids=["a dropper", "contact wire"],
 )
 @pytest.mark.parametrize("method", few_values(METHODS, "average acceleration"))
@@ -282,7 +283,10 @@ def test_a_continued_run_is_the_uninterrupted_one(own: dict[str, Any], at: int) 
         contact=LinearLaw(5e4, 50.0),
         train=train(70.0, 105.0, 133.0, behind=(0.0, 31.0), raise_time=0.1),
         numerics=numerics(1e-3, **own),
-        incidents=(DropperBreak(0.2, 126.5 - 6.5), TensionLoss(0.3, MESSENGER_WIRE, 0.8)),
+        incidents=(
+            DropperBreak(0.2, DropperPlace(126.5 - 6.5)),
+            TensionLoss(0.3, MESSENGER_WIRE, 0.8),
+        ),
     )
     whole, rest = continued(problem, mesh, at)
     assert len(whole.time) == 401
@@ -317,7 +321,7 @@ def test_what_happens_far_away_is_not_felt(way: dict[str, Any]) -> None:
         contact=way.get("contact", LinearLaw(5e4, 50.0)),
         train=train(60.0, 70.0, 106.0, raise_time=0.2),
         numerics=numerics(1e-3, **way.get("numerics", {})),
-        incidents=(DropperBreak(0.3, 600.0 - 5.0),),
+        incidents=(DropperBreak(0.3, DropperPlace(600.0 - 5.0)),),
     )
     seen = march(problem, mesh)
     expected = march(replace(problem, incidents=()), mesh)
@@ -334,7 +338,7 @@ def test_what_happens_far_away_is_not_felt(way: dict[str, Any]) -> None:
 
 def test_what_a_scene_leaves_out_does_not_happen() -> None:
     """Without the effects, and after the end of the run, incidents change no bit of it."""
-    problem = undamped((DropperBreak(0.4, 90.0), TensionLoss(0.5, CONTACT_WIRE, 0.7)))
+    problem = undamped((DropperBreak(0.4, DropperPlace(90.0)), TensionLoss(0.5, CONTACT_WIRE, 0.7)))
     mesh = mesh_of(problem.line, 2)
     problem = replace(problem, train=replace(problem.train, end=102.0))
     without = march(replace(problem, incidents=()), mesh)["contact_force"]
@@ -346,7 +350,7 @@ def test_what_a_scene_leaves_out_does_not_happen() -> None:
 
 
 def test_an_incident_at_the_very_start_happens() -> None:
-    problem = undamped((DropperBreak(0.0, 90.0),))
+    problem = undamped((DropperBreak(0.0, DropperPlace(90.0)),))
     mesh = mesh_of(problem.line, 2)
     problem = replace(problem, train=replace(problem.train, end=75.0))
     seen = march(problem, mesh)
@@ -357,7 +361,9 @@ def test_an_incident_at_the_very_start_happens() -> None:
 
 
 def test_times_are_rounded_to_steps() -> None:
-    first, second, third = (DropperBreak(time, 90.0) for time in (0.0014, 0.0016, 0.0114))
+    first, second, third = (
+        DropperBreak(time, DropperPlace(90.0)) for time in (0.0014, 0.0016, 0.0114)
+    )
     assert in_steps([third, second, first], 1e-3) == [
         Happened(1, (first,)),
         Happened(2, (first, second)),

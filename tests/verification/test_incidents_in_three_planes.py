@@ -11,6 +11,7 @@ from measuring import check, march, matrix_of
 from small_lines import FREE_MASS, WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 from spatial_line import SpatialLine, shape
 
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.problem.ends import AlongTrack
@@ -35,7 +36,7 @@ def staggered(n: int) -> LineData:
 
 
 LOST = (TensionLoss(0.1, CONTACT_WIRE, 0.7),)
-BOTH = (TensionLoss(0.1, MESSENGER_WIRE, 0.9), DropperBreak(0.1, 40.0))
+BOTH = (TensionLoss(0.1, MESSENGER_WIRE, 0.9), DropperBreak(0.1, DropperPlace(40.0)))
 
 
 @pytest.mark.parametrize("incidents", [LOST, BOTH], ids=["contact wire", "messenger and dropper"])
@@ -74,7 +75,7 @@ def test_a_march_comes_to_the_rest_that_statics_finds() -> None:
     """Strongly damped, with leaning droppers and arms as bars: to what is left of the motion."""
     line, settled = staggered(3), 4.0
     still = train(20.0, 20.0, 20.0 + 20.0 * settled, data=FREE_MASS, static_force=1.0)
-    incidents = (TensionLoss(0.1, CONTACT_WIRE, 0.8), DropperBreak(0.2, 70.0))
+    incidents = (TensionLoss(0.1, CONTACT_WIRE, 0.8), DropperBreak(0.2, DropperPlace(70.0)))
     problem = problem_of(
         line,
         frozenset(LATERAL),

@@ -11,6 +11,7 @@ from scipy import integrate
 from small_lines import HANGING, WHOLE, ac_simple_line, en50318_line, mesh_of, problem_of, train
 from static_line import absolute_rest, first_rest
 
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.wires import worn_bending
 from catenary.solver.effects.effect import Effect
@@ -69,7 +70,7 @@ def heights_of(model: Model, form: Equilibrium) -> np.ndarray:
 
 
 def given(*errors: tuple[float, float]) -> LengthErrors:
-    return LengthErrors(0.0, 3.0, 1, errors)
+    return LengthErrors(0.0, 3.0, 1, tuple((DropperPlace(x), error) for x, error in errors))
 
 
 def test_one_dropper_10_mm_short_lifts_the_wire_by_an_influence_line() -> None:
@@ -105,7 +106,9 @@ def test_one_dropper_10_mm_short_lifts_the_wire_by_an_influence_line() -> None:
 @pytest.mark.parametrize("error", [0.010, 0.1, -0.1])
 def test_lengths_as_cut_rest_as_absolute_heights_do(error: float) -> None:
     """Errors of 100 mm leave droppers slack: which ones, a second solution finds by itself."""
-    lengths = LengthErrors(abs(error) / 4, 2.0, 7, ((MIDDLE, error), (20.5, -error)))
+    lengths = replace(
+        given((MIDDLE, error), (20.5, -error)), deviation=abs(error) / 4, cut_off=2.0, seed=7
+    )
     _, _, model, form = hung(lengths=lengths)
     tensions = {CONTACT_WIRE: 22e3, MESSENGER_WIRE: 16e3}
     taut = replace(model, dropper_gap=np.zeros_like(model.dropper_gap))
@@ -123,7 +126,7 @@ def test_lengths_as_cut_rest_as_absolute_heights_do(error: float) -> None:
 @pytest.mark.parametrize("kind", [MissingDropper, LooseClamp])
 def test_without_a_dropper_the_line_rests_as_absolute_heights_do(kind: type) -> None:
     model, first = sound()
-    _, mesh, changed, form = hung(kind(MIDDLE))
+    _, mesh, changed, form = hung(kind(DropperPlace(MIDDLE)))
     number = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - MIDDLE)))
     tensions = {CONTACT_WIRE: 22e3, MESSENGER_WIRE: 16e3}
     bare = replace(changed, broken=np.zeros_like(changed.broken))
@@ -246,7 +249,7 @@ def test_a_dropper_slack_at_rest_is_an_open_link_under_way() -> None:
     """
     line, k = en50318_line(3), 1e5
     near, far = 83.5, 163.0
-    lengths = LengthErrors(0.0, 3.0, 1, ((near, 0.05), (far, 0.06)))
+    lengths = given((near, 0.05), (far, 0.06))
     whole = WHOLE | EFFECTS
     problem = problem_of(
         line,
@@ -271,7 +274,7 @@ def test_a_dropper_slack_at_rest_is_an_open_link_under_way() -> None:
         gaps = model.dropper_gap[slack]
         builder.add_links("open", pairs, law(places, k, acts=PULLS, gap=gaps))
 
-    loose = tuple(LooseClamp(float(x)) for x in places)
+    loose = tuple(LooseClamp(DropperPlace(float(x))) for x in places)
     with registered(Effect("open_links", "links", "links", "test", False, build=open_links)):
         other = march(replace(problem, effects=whole | {"open_links"}, defects=loose), mesh)
     # Droppers hang with the same lengths, so that both lines rest in the same shape.

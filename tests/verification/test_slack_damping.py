@@ -18,6 +18,7 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from studies import few_values
 from ts_alpha2 import TS_ALPHA2
 
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.model.partition import distribute
@@ -195,7 +196,7 @@ def test_a_slack_dropper_that_breaks_takes_its_damper_along(scheme: str) -> None
     rate = state["velocity"][upper] - state["velocity"][lower]
     pushed = model.dropper_damping[number] * rate
     assert abs(pushed) > 10.0
-    incident = DropperBreak(step * 1e-3, float(mesh.x(mesh.droppers[number, 1])))
+    incident = DropperBreak(step * 1e-3, DropperPlace(float(mesh.x(mesh.droppers[number, 1]))))
     broken = replace(problem, effects=WHOLE | {"dropper_break"}, incidents=(incident,))
     first, later = unchanged(model, form), changed_line(model, form, (incident,))
     ownership = distribute(model, COMM.size, COMM.rank)

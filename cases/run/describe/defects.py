@@ -14,7 +14,6 @@ from catenary.cases.scene.line.imperfections import (
     MissingDropperTable,
     WornWireTable,
     WrongTensionTable,
-    place_of,
     stretch_of,
 )
 from catenary.cases.scene.run.incidents import (
@@ -92,12 +91,11 @@ def _lengths(table: LengthsTable) -> str:
 def _defect(table: Defect, line: Line) -> dict[str, Any]:
     match table:
         case MissingDropperTable() | LooseClampTable():
-            x = place_of(line, table.span, table.dropper)
-            which = f"dropper {table.dropper} of span {table.span}, at {x:g} m"
+            at, which = _dropper(line, table.span, table.dropper)
             missing = isinstance(table, MissingDropperTable)
             what = "is missing" if missing else "has a loose clamp and carries nothing"
             wire = line.wires_of(Role.CONTACT)[0].name
-            return {"at_m": x, "wire": wire, "says": f"{which}, {what}"}
+            return {**at, "wire": wire, "says": f"{which}, {what}"}
         case WornWireTable():
             lost = f"has lost {100 * table.lost_share:g} % of its section"
             where = f"from {table.from_m:g} to {table.to_m:g} m"
@@ -141,16 +139,21 @@ def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
     return sorted(found, key=lambda fact: float(str(fact["time_s"])))
 
 
+def _dropper(line: Line, span: int, number: int) -> tuple[dict[str, float], str]:
+    """Place of a dropper [m] and which it is of those there, and both in words."""
+    x, nth = line.dropper_of_span(span, number)
+    return {"at_m": x, "nth": nth}, f"dropper {number} of span {span}, at {x:g} m"
+
+
 def _place(table: Incident, line: Line) -> dict[str, float]:
     if not isinstance(table, DropperBreakTable):
         return {}
-    return {"at_m": place_of(line, table.span, table.dropper)}
+    return _dropper(line, table.span, table.dropper)[0]
 
 
 def _sentence(table: Incident, line: Line) -> str:
     if isinstance(table, DropperBreakTable):
-        x = place_of(line, table.span, table.dropper)
-        return f"dropper {table.dropper} of span {table.span}, at {x:g} m, breaks"
+        return f"{_dropper(line, table.span, table.dropper)[1]}, breaks"
     if isinstance(table, TensionLossTable):
         left = table.share * line.wire(table.wire).tension / 1e3
         name = wire_words(table.wire)

@@ -265,8 +265,9 @@ def _tensions_fall(scene: Scene) -> Iterator[Fault]:
 
 def _time(scene: Scene, i: int, table: IncidentTable, duration: float) -> Iterator[Fault]:
     dt = scene.numerics.dt_s
-    if round(table.at_s / dt) >= math.floor(duration / dt + 1e-9):
-        why = f"it must be less than the {duration:.4g} s that the run lasts"
+    last = math.floor(duration / dt + 1e-9)
+    if round(table.at_s / dt) >= last:
+        why = f"it must be at most {(last - 1) * dt:.8g} s, a step before the run ends"
         yield scene.refused(f"incidents.{i}.at_s", why)
 
 

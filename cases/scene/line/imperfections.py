@@ -245,9 +245,9 @@ def defects_of(tables: Sequence[Defect], line: Line) -> tuple[SolverDefect, ...]
 def _defect(table: Defect, line: Line) -> SolverDefect:
     match table:
         case MissingDropperTable():
-            return solver.MissingDropper(place_of(line, table.span, table.dropper))
+            return solver.MissingDropper(line.dropper_of_span(table.span, table.dropper))
         case LooseClampTable():
-            return solver.LooseClamp(place_of(line, table.span, table.dropper))
+            return solver.LooseClamp(line.dropper_of_span(table.span, table.dropper))
         case WornWireTable():
             return solver.WornWire(table.wire, table.from_m, table.to_m, table.lost_share)
         case WrongTensionTable():
@@ -256,11 +256,6 @@ def _defect(table: Defect, line: Line) -> SolverDefect:
             return solver.HardSpot(table.wire, table.at_m, table.mass_kg, table.stiffness_N_per_m)
         case KinkTable():
             return solver.Kink(table.wire, table.at_m, angle_from_deg(table.angle_deg))
-
-
-def place_of(line: Line, span: int, dropper: int) -> float:
-    """Place of a dropper, by the number of its span and its own there, from 1 [m]."""
-    return float(line.droppers_of_span(span - 1)[dropper - 1])
 
 
 def irregularities_of(table: IrregularitiesTable, line: Line) -> Irregularities:
@@ -293,7 +288,7 @@ def _heights(table: HeightTable, line: Line) -> Heights:
 
 def _lengths(table: LengthsTable, line: Line) -> LengthErrors:
     given = tuple(
-        (place_of(line, int(span), int(dropper)), length_from_mm(error))
+        (line.dropper_of_span(int(span), int(dropper)), length_from_mm(error))
         for span, dropper, error in table.by_dropper or ()
     )
     deviation = length_from_mm(table.standard_deviation_mm)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from catenary.cases.scene.keys.table import Table, WireName
-from catenary.cases.scene.line.imperfections import place_of
 from catenary.meshgen.line import Line
 from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 
@@ -80,7 +79,7 @@ def line_incidents(
     for table in tables:
         time = at_step(table.at_s, dt)
         if isinstance(table, DropperBreakTable):
-            found.append(DropperBreak(time, place_of(line, table.span, table.dropper)))
+            found.append(DropperBreak(time, line.dropper_of_span(table.span, table.dropper)))
         elif isinstance(table, TensionLossTable):
             found.append(TensionLoss(time, table.wire, table.share))
     return tuple(found)

@@ -69,7 +69,7 @@ def _leaves(
 ) -> float:
     mesh, line = rest.model.mesh, rest.problem.line
     if isinstance(incident, DropperBreak):
-        number = int(np.argmin(np.abs(mesh.x(mesh.droppers[:, 1]) - incident.x)))
+        (number,) = rest.model.droppers_at([incident.place])
         return float(rest.model.dropper_slopes.energy_under(force)[number])
     before = shares.get(incident.wire, 1.0)
     shares[incident.wire] = incident.share

@@ -194,12 +194,12 @@ def without_train(problem: Problem, excitation: Excitation) -> Problem:
 
 
 class Watch(Observer):
-    """Observer that shows the uplift of all nodes at every so many steps.
+    """Observer that shows the motion of all nodes at every so many steps.
 
     Parameters
     ----------
     every : steps from one time to the next
-    seen : receivers of the uplift
+    seen : receivers of the motion
     """
 
     def __init__(self, every: int, seen: Sequence[NodeMotion]) -> None:
@@ -208,6 +208,7 @@ class Watch(Observer):
     def start(self, stage: Stage) -> None:
         """Match the rows with nodes."""
         self._nodes = stage.owned_nodes
+        self._axes = [(k, name) for k, name in enumerate("uvw") if name in stage.unknowns]
 
     def next_state(self, step: int) -> int:
         """No state is needed."""
@@ -220,7 +221,8 @@ class Watch(Observer):
     def observe(self, view: StepView) -> None:
         """Hand over, if it is time."""
         if view.step % self._every == 0:
-            uplift = np.empty(self._nodes.size)
-            uplift[self._nodes] = view.node_uplift()
+            moved = np.zeros((self._nodes.size, 3))
+            for axis, name in self._axes:
+                moved[self._nodes, axis] = view.node_motion(name, False)
             for one in self._seen:
-                one.add(view.time, uplift)
+                one.add(view.time, moved)

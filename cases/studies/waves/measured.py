@@ -12,8 +12,9 @@ from catenary.solver.waves.bloch import BlochWaves
 
 # A band is so many widths to both sides, and lies within a branch [-]; its largest width [Hz].
 _WIDTHS, _WIDEST = 4.0, 0.2
-# Narrower bands last too long [Hz]; in which share of the record waves are to arrive [-].
-_NARROWEST, _IN_TIME = 0.03, 0.8
+# Narrower bands last too long [Hz]; a record has so many deviations of a signal in time behind its
+# centre [-].
+_NARROWEST, _LATE = 0.03, 1.3
 # Share of a record, at its end, over which a signal is let fade before its spectrum is taken.
 _FADED = 0.25
 # The fastest waves up to these frequencies are measured [Hz].
@@ -86,15 +87,20 @@ def measured_rows(
     ``waves.csv``.
 
     ``theory`` is that of the line, ``seen`` the motion after the blow, ``spectrum`` the spectra at
-    two stations. There are no rows without a blow, periodic line or room for two stations, nor
-    where the start of the line sends waves back to these stations within the record.
+    two stations. Signals are taken until an end of the line may send waves back to a station. There
+    are no rows without a blow, periodic line or room for two stations, nor where a band has not
+    passed both by then.
     """
     waves, columns = theory.bloch, _stations(theory, seen)
     if waves is None or columns is None:
         return []
-    first, second = (seen.velocity[:, column].astype(float) for column in columns)
+    signals = [seen.velocity[:, column].astype(float) for column in columns]
     distance = float(seen.x[columns[1]] - seen.x[columns[0]])
-    way_back = float(seen.struck + seen.x[columns[0]] - 2.0 * seen.x[0])
+    reach = float(seen.x[columns[1]] - seen.struck)
+    way_back = min(
+        seen.struck + seen.x[columns[0]] - 2.0 * seen.x[0],
+        2.0 * seen.x[-1] - seen.struck - seen.x[columns[1]],
+    )
     rows = []
     if spectrum is not None:
         note = (
@@ -102,17 +108,22 @@ def measured_rows(
             "bands of the periodic line"
         )
         rows.append(row_of("energy_in_pass_bands", spectrum.inside, "-", note))
-    for number, highest in enumerate(_UP_TO, start=1):
-        frequency, velocity = branch_of_fastest(waves, highest)
+    branches = [branch_of_fastest(waves, highest) for highest in _UP_TO]
+    if np.array_equal(branches[0][0], branches[1][0]):
+        del branches[1:]  # one has the fastest wave of all
+    for number, (frequency, velocity) in enumerate(branches, start=1):
         at, wide = 0.5 * (frequency[0] + frequency[-1]), frequency[-1] - frequency[0]
         width = min(_WIDEST, float(wide) / (2.2 * _WIDTHS))
         slowest = velocity[np.abs(frequency - at) < _WIDTHS * width].min()
-        record = float(np.ptp(seen.time))
-        if width < _NARROWEST or distance / slowest > _IN_TIME * record:
+        time = seen.time[seen.time - seen.time[0] < way_back / velocity.max()]
+        if width < _NARROWEST:
             continue
-        if way_back < velocity.max() * record:
+        centre = reach / float(np.interp(at, frequency, velocity))
+        late = max(reach / slowest, centre + _LATE / (2.0 * np.pi * width))
+        if late > (1.0 - _FADED) * np.ptp(time):
             continue
-        found = arrived(seen.time, first, second, distance, float(at), width)
+        first, second = (signal[: time.size] * _fade(time.size) for signal in signals)
+        found = arrived(time, first, second, distance, float(at), width)
         what = f"around {at:.1f} Hz over {distance:.0f} m"
         name, theirs = f"group_velocity_{number}", found.expected(frequency, velocity)
         rows += [
@@ -150,10 +161,7 @@ def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
     if columns is None:
         return None
     n = seen.time.size
-    # Motion that goes on at the end of the record would spill over all frequencies.
-    fade = np.ones(n)
-    late = max(1, int(_FADED * n))
-    fade[-late:] = 0.5 * (1.0 + np.cos(np.pi * np.arange(late) / late))
+    fade = _fade(n)
     step = float(seen.time[1] - seen.time[0])
     frequency = np.fft.rfftfreq(4 * n, step)
     chosen = frequency <= HIGHEST
@@ -170,6 +178,14 @@ def transmitted(theory: WaveTheory, seen: WavesSeen) -> Transmitted | None:
     return Transmitted(
         frequency, first / first.max(), second / second.max(), bands, inside, distance
     )
+
+
+def _fade(n: int) -> np.ndarray:
+    """Factors (n,) that let a record fade: motion that goes on at its end would spill over all
+    frequencies."""
+    fade, late = np.ones(n), max(1, int(_FADED * n))
+    fade[-late:] = 0.5 * (1.0 + np.cos(np.pi * np.arange(late) / late))
+    return fade
 
 
 def _stations(theory: WaveTheory, seen: WavesSeen) -> tuple[int, int] | None:

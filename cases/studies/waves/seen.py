@@ -90,8 +90,8 @@ def places_of(seen: WavesSeen, time: np.ndarray) -> np.ndarray:
 class NodeMotion(Protocol):
     """Takes the motion of all nodes, time after time."""
 
-    def add(self, time: float, uplift: np.ndarray) -> None:
-        """The uplift of the nodes (n_nodes,) [m] at a time [s], later than the one before."""
+    def add(self, time: float, moved: np.ndarray) -> None:
+        """Displacements of the nodes (n_nodes, 3) [m] at a time [s], later than the one before."""
 
 
 class WireMotion:
@@ -108,10 +108,10 @@ class WireMotion:
         self._times: list[float] = []
         self._rows: list[np.ndarray] = []
 
-    def add(self, time: float, uplift: np.ndarray) -> None:
-        """Add the uplift of the nodes at a time, as `NodeMotion.add`."""
+    def add(self, time: float, moved: np.ndarray) -> None:
+        """Add the motion of the nodes at a time, as `NodeMotion.add`."""
         self._times.append(time)
-        row = np.interp(self.x, self._along, uplift[self._nodes])
+        row = np.interp(self.x, self._along, moved[self._nodes, 2])
         self._rows.append(row.astype(np.float32))
 
     def seen(
@@ -148,9 +148,9 @@ def waves_seen(
     nodes = data.lowest_contact_nodes()
     wire = WireMotion(nodes, data.points[nodes, 0])
     for number, time in enumerate(snapshots.times.tolist()):
-        uplift = snapshots.uplift(number)
+        moved = snapshots.displacement(number)
         for one in (wire, *others):
-            one.add(time, uplift)
+            one.add(time, moved)
     if data.excitation is not None:
         return wire.seen(*course_of(data.excitation))
     return wire.seen(lambda times: data.position[[data.row_at(t) for t in times.tolist()]])
@@ -165,6 +165,8 @@ def course_of(excitation: Excitation) -> tuple[Callable[[np.ndarray], np.ndarray
 
 # Length of the stretches of line that energy is summed over [m].
 STRETCH = 2.0
+# Displacements of a node along x, y and z, and slopes of the latter two.
+_ALONG_AXES, _SLOPES = ("u", "v", "w"), ("", "theta_z", "theta_y")
 # Length beside an end of a window in which a spline still swings after the step there [m].
 _FROM_END = 4.0
 
@@ -218,6 +220,11 @@ class EnergySeen:
         ahead = (right > end - _FROM_END) & (end < right[-1] - STRETCH)
         return replace(self, density=np.where(behind | ahead, 0.0, self.density))
 
+    def until(self, end: float) -> EnergySeen:
+        """The energy between snapshots up to ``end`` [s]."""
+        n = int(self.time.searchsorted(end - 0.5 * (self.time[1] - self.time[0]) + 1e-9))
+        return replace(self, time=self.time[:n], density=self.density[:n])
+
     def around(self, place: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Distances from a place that moves (t,) [m], up to ``reach``, and the mean over time of
         the density there, (m,) each; NaN where the line never is."""
@@ -233,23 +240,22 @@ class EnergySeen:
 
 
 class EnergyMotion:
-    """Collects the energy of a line from the uplift of its nodes; a `NodeMotion`.
+    """Collects the energy of a line from the motion of its nodes; a `NodeMotion`.
 
-    Slopes are those of cubic splines through a wire's nodes. Between two snapshots the uplift is
+    Slopes are those of cubic splines through a wire's nodes. Between two snapshots the motion is
     their mean and the velocity their difference over the time between them: a wave of angular
     frequency w loses (w dt)^2 / 12 of its kinetic and (w dt)^2 / 4 of its elastic energy.
 
     Parameters
     ----------
     rest : the line
-    nodes : (n_nodes,) for each node of its mesh, its number in the uplift that is added
+    nodes : (n_nodes,) for each node of its mesh, its number in the motion that is added
     """
 
     def __init__(self, rest: LineAtRest, nodes: np.ndarray | None = None) -> None:
         model, mesh = rest.model, rest.mesh
         self._nodes = np.arange(mesh.n_nodes) if nodes is None else nodes
-        self._deflection = model.dofs(np.arange(mesh.n_nodes))
-        self._slope = model.dofs(np.arange(mesh.n_nodes), "theta_y")
+        self._numbering = model.numbering
         self._pieces = list(_pieces(mesh))
         self._stiffness, self._mass = (
             whole_matrix(model, **kind).tocsr() for kind in ({"stiffness": 1.0}, {"mass": 1.0})
@@ -258,8 +264,8 @@ class EnergyMotion:
         edges = np.arange(self._x.min(), self._x.max() + STRETCH, STRETCH)
         self._middles = edges[:-1] + 0.5 * STRETCH
         place = np.zeros(model.n_dofs)
-        for numbers in (self._deflection, self._slope):
-            place[numbers] = self._x
+        for numbers in model.numbering.numbers.T:
+            place[numbers[numbers >= 0]] = self._x[numbers >= 0]
         last = self._middles.size - 1
         self._stretch = np.clip(((place - edges[0]) // STRETCH).astype(int), 0, last)
         # Droppers and their bends: see `_switched`.
@@ -272,9 +278,9 @@ class EnergyMotion:
         self._times: list[float] = []
         self._rows: list[np.ndarray] = []
 
-    def add(self, time: float, uplift: np.ndarray) -> None:
-        """Add the uplift of the nodes at a time, as `NodeMotion.add`."""
-        now = uplift[self._nodes]
+    def add(self, time: float, moved: np.ndarray) -> None:
+        """Add the motion of the nodes at a time, as `NodeMotion.add`."""
+        now = moved[self._nodes]
         if self._before is not None:
             then, earlier = self._before
             self._times.append(0.5 * (then + time))
@@ -285,21 +291,25 @@ class EnergyMotion:
         """Return all that was added."""
         return EnergySeen(np.array(self._times), self._middles, np.array(self._rows))
 
-    def _density(self, uplift: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        d, v = self._vector(uplift), self._vector(velocity)
+    def _density(self, moved: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        d, v = self._vector(moved), self._vector(velocity)
         energy = 0.5 * (d * (self._stiffness @ d) + v * (self._mass @ v))
         n = self._middles.size
         density = np.bincount(self._stretch, energy, n)
         density += np.bincount(self._link_stretch, self._switched(d), n)
         return density / STRETCH
 
-    def _vector(self, values: np.ndarray) -> np.ndarray:
-        """Unknowns of the line whose deflections are ``values`` by nodes."""
-        vector = np.zeros(self._size)
-        vector[self._deflection] = values
-        for nodes in self._pieces:
-            spline = CubicSpline(self._x[nodes], values[nodes])
-            vector[self._slope[nodes]] = spline(self._x[nodes], 1)
+    def _vector(self, moved: np.ndarray) -> np.ndarray:
+        """Unknowns of the line whose nodes are displaced by ``moved``, (n_nodes, 3)."""
+        vector, every = np.zeros(self._size), np.arange(len(moved))
+        for name, slope, values in zip(_ALONG_AXES, _SLOPES, moved.T, strict=True):
+            there = self._numbering.has(every, name)
+            if there.any():
+                vector[self._numbering.of(every[there], name)] = values[there]
+            for nodes in self._pieces if slope in self._numbering.names else ():
+                own = self._numbering.has(nodes, slope)
+                steep = CubicSpline(self._x[nodes], values[nodes])(self._x[nodes], 1)
+                vector[self._numbering.of(nodes[own], slope)] = steep[own]
         return vector
 
     def _switched(self, d: np.ndarray) -> np.ndarray:

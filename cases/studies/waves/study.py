@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.base.errors import RunBroken
+from catenary.base.errors import InputError, RunBroken
 from catenary.base.mpi import MPI
 from catenary.cases.result_folder.output_folder import refuse_earlier, refuse_table
 from catenary.cases.run.excited_run import ExcitedRun
@@ -43,6 +43,7 @@ from catenary.cases.studies.waves.theory import (
     row_of,
     wave_theory,
 )
+from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.film.film_data import film_data
@@ -83,6 +84,12 @@ def study_waves(folder: Path) -> tuple[str, list[Path]]:
             numbers = np.empty(rest.mesh.n_nodes, dtype=np.int64)  # of the nodes in the run
             for name, nodes in rest.mesh.wires.items():
                 numbers[nodes] = data.wires[name]
+            if {"u", "v"} & set(rest.model.unknowns) and not snapshots.has_vectors:
+                raise InputError(
+                    f"{folder / 'fields.h5'} has the uplift alone, and the energy of this line is "
+                    'that of all its motions; run the scene again with "displacement" in '
+                    "output.fields"
+                )
             energy = EnergyMotion(rest, numbers)
             seen = waves_seen(data, snapshots, [energy])
             ends = np.array([snapshots.moving(n) for n in range(snapshots.times.size)])
@@ -153,10 +160,18 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
     Raises
     ------
     InputError
-        If the folder holds such a table and ``force`` is not given.
+        If the folder holds such a table and ``force`` is not given, or if a wire is carried by its
+        bending.
     """
     refuse_table(folder / OBSTACLES, force)
     problem = problem_of(scene)
+    for wire in problem.line.wires:
+        if bends(slowest_wave_of(problem.line, wire), wire.tension, wire.mass_per_length):
+            raise InputError(
+                f"--obstacles measures wires under tension; {wire.name} carries waves by bending, "
+                "whose speeds are too different for a window in time to part what comes from what "
+                "goes back"
+            )
     rest = line_at_rest(problem, mesh_of(scene))
     results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
     lines = [
@@ -185,17 +200,23 @@ def _write(
 ) -> tuple[str, list[Path]]:
     """Text, and pictures of the waves that are seen, and tables with theory beside them."""
     moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
+    until = min((incident.time for incident in rest.model.simulated.incidents), default=np.inf)
+    if until < energy.time[-1]:
+        energy = energy.until(until)
+        remarks = [*remarks, f"Energies end at {until:g} s, when an incident changes the line."]
     reflections, spectra = reflections_of(rest), transmitted(theory, seen)
     measured = [
         *measured_rows(theory, seen, spectra), *reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
     content: dict[str, Content] = {
-        "energy.csv": energy_rows(energy, seen),
+        "energy.csv": energy_rows(energy, seen) if energy.time.size > 1 else [],
         TABLE: [*as_rows(theory), *measured],
         "pass_bands.csv": band_rows(theory),
         "space_time.png": lambda: pictures.space_time(seen, theory, supports, moving),
         "wavenumbers.png": lambda: pictures.wavenumbers(seen, theory, what),
-        "energy.png": lambda: pictures.energy_parts(energy, seen, origin),
+        "energy.png": lambda: (
+            pictures.energy_parts(energy, seen, origin) if energy.time.size > 1 else None
+        ),
     }
     if reflections:
         both = rest.problem.ends

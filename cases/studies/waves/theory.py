@@ -89,9 +89,11 @@ class WaveTheory:
         found = np.sort(waves.frequency[inside])
         if not found.size:
             return np.zeros((0, 2))
-        # Neighbours that are no further apart than waves of neighbouring phases are one range.
+        # Neighbours that are no further apart than waves of neighbouring phases are one range,
+        # unless they lie in two pass bands.
         gap = max(0.1, float(np.abs(np.diff(waves.frequency, axis=0)).max()))
-        first = np.append(True, np.diff(found) > gap)
+        band = np.searchsorted(self.bands()[:, 0], found, side="right")
+        first = np.append(True, (np.diff(found) > gap) | (np.diff(band) > 0))
         return np.column_stack([found[first], found[np.append(first[1:], True)]])
 
 

@@ -115,7 +115,7 @@ register(
         data="defects of the type missing_dropper",
         applies=_has(MissingDropper),
         law=lambda laws, p: replace(
-            laws, missing=tuple(defect.x for defect in _of_kind(p, MissingDropper))
+            laws, missing=tuple(defect.place for defect in _of_kind(p, MissingDropper))
         ),
         after_cutting=True,
     ),
@@ -128,7 +128,7 @@ register(
         data="defects of the type loose_clamp",
         applies=_has(LooseClamp),
         law=lambda laws, p: replace(
-            laws, loose=tuple(defect.x for defect in _of_kind(p, LooseClamp))
+            laws, loose=tuple(defect.place for defect in _of_kind(p, LooseClamp))
         ),
         after_cutting=True,
     ),

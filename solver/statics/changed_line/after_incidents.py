@@ -99,7 +99,7 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     shares: dict[str, float] = {}
     for incident in incidents:
         if isinstance(incident, DropperBreak):
-            broken[dropper_at(first, incident.x)] = True
+            broken[first.droppers_at([incident.place])] = True
         else:
             shares[incident.wire] = incident.share
     after = replace(problem, line=problem.line.with_shares(shares))
@@ -173,12 +173,6 @@ def _break_unstable(model: Model) -> None:
         refuse_unstable(model)
     except InputError as error:
         raise RunBroken(f"after an incident {error}") from None
-
-
-def dropper_at(model: Model, x: float) -> int:
-    """Number of the dropper that stands nearest to ``x`` [m]."""
-    places = model.mesh.x(model.mesh.droppers[:, 1])
-    return int(np.argmin(np.abs(places - x)))
 
 
 def acceleration_jump(

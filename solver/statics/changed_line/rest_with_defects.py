@@ -77,7 +77,9 @@ def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
     if errors is None:
         return np.zeros(n)
     found = errors.of(n)
-    np.add.at(found, cut.droppers_at([x for x, _ in errors.given]), [e for _, e in errors.given])
+    np.add.at(
+        found, cut.droppers_at([place for place, _ in errors.given]), [e for _, e in errors.given]
+    )
     return found
 
 

@@ -14,6 +14,7 @@ from scenes import problem_of as scene_problem
 from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary import InputError
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.solver.kernels import native
@@ -259,7 +260,7 @@ def test_what_happens_ahead_of_an_exact_window_is_part_of_it() -> None:
     problem, mesh = scene(0.5, ac_simple_line(24))
     droppers = np.sort(mesh.x(mesh.droppers[:, 1]))
     far = float(droppers[np.searchsorted(droppers, START + 700.0)])
-    incidents = (DropperBreak(0.1, far),)
+    incidents = (DropperBreak(0.1, DropperPlace(far)),)
     effects = problem.effects | {"dropper_break"}
     problem = replace(problem, incidents=incidents, effects=effects)
     whole, _ = steps(problem, mesh, WindowChoice())
