@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from catenary.base.parallel import on_root
+from catenary.mbs.air import Airflow
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
 from catenary.mbs.called_model import CalledModel
 from catenary.mbs.head.head_arrays import N_DRIVE, named
@@ -130,6 +131,7 @@ class Pantographs:
     outputs : ``position`` and all these of the latest step one after another
     speed : of the train [m/s]
     places_along : TrainPlaces
+    along_track : whether a base or the air at a pantograph depends on its place, rank 0
     reach : how far contacts are behind and ahead of their pantographs at most [m], all ranks
     ends : StripEnds, contacts of each strip and strips of each pantograph
     work : of the contact forces on this rank's part of the line
@@ -205,6 +207,7 @@ class Pantographs:
         self.joints_in_loop = any(self._has_joints)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
+        self.along_track = False
         self._followed: list[FollowedPath] = []
         on_root(comm, lambda: self._make_all(problem, simulated, nominal_height), takes_long=True)
 
@@ -364,7 +367,9 @@ class Pantographs:
                 path = None
             elif path is None:
                 path = _lateral_path(problem, placement, base, self._wires)
-            model = _make(problem, simulated, placement, height, self.n_wires, base, path)
+            flow = airflow(problem, simulated, placement)
+            self.along_track |= any(own is not None and own.along_track for own in (base, flow))
+            model = _make(problem, simulated, placement, height, self.n_wires, base, flow, path)
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
@@ -378,6 +383,7 @@ def _make(
     nominal_height: float,
     n_wires: int,
     base: BaseMotion | None,
+    flow: Airflow | None,
     path: CrossingPath | None,
 ) -> Pantograph:
     numerics, train = problem.numerics, problem.train
@@ -386,7 +392,7 @@ def _make(
         placement.static_force,
         nominal_height,
         stepping,
-        airflow(problem, simulated, placement),
+        flow,
         placement.lowering if simulated.lowering else None,
         placement.regulator if simulated.regulated_lift else None,
         simulated.head_roll,
