@@ -37,7 +37,8 @@ class Airflow:
     """The air around one pantograph, which is at ``start`` [m] at time 0 and has ``speed`` [m/s].
 
     ``wind`` is that at a place and a time, None in still air; ``crosswind_factor`` says how far the
-    square of its part across the track counts in that of the air's speed.
+    square of its part across the track counts in that of the air's speed. ``sheltered`` says
+    whether the wind is another one in some stretches.
     """
 
     speed: float
@@ -45,6 +46,12 @@ class Airflow:
     tunnels: tuple[Tunnel, ...] = ()
     wind: WindAt | None = None
     crosswind_factor: float = 0.0
+    sheltered: bool = False
+
+    @property
+    def along_track(self) -> bool:
+        """Whether it depends on the place along the track."""
+        return bool(self.tunnels) or self.sheltered
 
     @property
     def steady(self) -> bool:

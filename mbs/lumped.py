@@ -85,7 +85,7 @@ class LumpedPantograph(SteppedHead):
     @property
     def is_linear(self) -> bool:
         """Whether a step is linear in its state and in what drives it."""
-        return not (self.is_regulated or self._laws.laws or self._bending is not None)
+        return not (self.is_regulated or self._laws.laws)
 
     def linear_step(self) -> LinearStep:
         """A step without laws: new state = step @ state + drive * by_drive - by_force @ force, with

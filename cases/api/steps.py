@@ -237,8 +237,9 @@ class Simulation:
         Raises
         ------
         InputError
-            If it is negative or no number, or if the heads of the scene roll or bend: where wires
-            cross them is prepared for one speed.
+            If it is negative or no number, or if heads of the scene roll or bend, its vehicle
+            follows a track, or its pantographs meet tunnels or stretches of another wind: what a
+            pantograph meets at a place is prepared for one speed.
 
         Examples
         --------
@@ -255,8 +256,9 @@ class Simulation:
         if not (np.isfinite(value) and value >= 0.0):
             raise InputError(f"speed is {value}; it must be at least 0 [m/s] and finite")
         raise InputError(
-            f"speed cannot be set to {value:g} m/s: heads of this scene roll or bend, and where "
-            "wires cross them is prepared for one speed"
+            f"speed cannot be set to {value:g} m/s: heads of this scene roll or bend, its vehicle "
+            "follows a track, or its pantographs meet tunnels or stretches of another wind, and "
+            "what they meet at a place is prepared for one speed"
         )
 
     @property

@@ -86,6 +86,13 @@ class SteppedHead(ABC):
         return self._lateral is not None
 
     @property
+    def levers(self) -> np.ndarray:
+        """Levers of the strips on all coordinates at the start, and numbers of the tables of modes
+        of strips that bend, one after another."""
+        modes = () if self._bending is None else self._bending.tables.coefficients.ravel()
+        return np.append(self._touch[0], modes)
+
+    @property
     def is_regulated(self) -> bool:
         """Whether a controller changes its lift under way."""
         return self._control is not None or self.by_hand

@@ -225,12 +225,26 @@ def _mechanism(data: MultibodyData) -> _Mechanism:
     _judge_raising(data, motion)
     held = system.with_joints(holder)
     try:
+        motion = _carried_along(data, motion, held.assemble(motion))
         motion = held.assemble(motion)
     except InputError as error:
         raise InputError(
             f"its arm {data.arm!r} does not reach its working height of {height:g} m: {error}"
         ) from error
     return _Mechanism(missed, system, held, height, motion, Places(data.actuator))
+
+
+def _carried_along(data: MultibodyData, before: Motion, after: Motion) -> Motion:
+    """Motion ``after`` one of the arm, with the head as far from it as ``before``.
+
+    Nothing but springs takes a head along: an arm that has risen past it would find it at rest
+    below, where it hangs from them.
+    """
+    head, arm = before.numbers[data.head], before.numbers[data.arm]
+    distance = [motion.position[head] - motion.position[arm] for motion in (before, after)]
+    way = np.zeros((after.n_bodies, 6))
+    way[head, :3] = distance[0] - distance[1]
+    return after.moved(way.ravel())
 
 
 def _bodies_of(data: MultibodyData) -> MultibodyData:

@@ -80,7 +80,7 @@ class RaisingPantograph(SteppedHead):
         self._zero = data.head_offset + data.base_height
         self._masses = np.append(head.masses, 0.0)
         self._stiffness, self._damping = head.stiffness, head.damping
-        self._tables = data.frame.tables(carried=stepping.base is not None)
+        self._tables = data.frame.tables
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
         sprung = SprungMasses(self._masses, self._stiffness, self._damping, self._push)

@@ -40,40 +40,30 @@ class ReducedMechanism:
     """Tables over the height of a point, joined by cubic splines.
 
     ``heights`` [m], growing; ``masses`` [kg], equivalent mass at the point; ``lifts`` [N], upward
-    force on the point at rest; ``dampings`` [N s/m]; all of shape (n,), n >= 4. ``name`` is the
-    pantograph's, for messages. ``carried`` [kg], shape (n,): the sum of m dz/dh, force on the point
-    per upward acceleration of the base; None if the base is at rest. ``blown`` [N], shape (n,):
-    upward force on the point by the air on the bodies; None if it has none.
+    force on the point at rest; ``dampings`` [N s/m]; ``carried`` [kg], the sum of m dz/dh, force on
+    the point per upward acceleration of the base; all of shape (n,), n >= 4. ``name`` is the
+    pantograph's, for messages. ``blown`` [N], shape (n,): upward force on the point by the air on
+    the bodies; None if it has none.
     """
 
     heights: np.ndarray
     masses: np.ndarray
     lifts: np.ndarray
     dampings: np.ndarray
+    carried: np.ndarray
     name: str = ""
-    carried: np.ndarray | None = None
     blown: np.ndarray | None = None
 
     def at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
         """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre."""
-        values, slopes = self._tables_at_rest.at(height)
+        values, slopes = self.tables.at(height)
         return values[:3], slopes[:3]
 
-    def tables(self, carried: bool) -> SplineTables:
-        """Splines of mass, lift, damping, carried mass (zero without ``carried``) and, of a
-        mechanism that meets the air, the upward force of the air on its bodies."""
-        if not carried:
-            return self._tables_at_rest
-        if self.carried is None:
-            raise ValueError("nothing is known of what a moving base carries along")
-        return self._tables_with(self.carried)
-
     @cached_property
-    def _tables_at_rest(self) -> SplineTables:
-        return self._tables_with(np.zeros_like(self.masses))
-
-    def _tables_with(self, carried: np.ndarray) -> SplineTables:
-        listed = [self.masses, self.lifts, self.dampings, carried]
+    def tables(self) -> SplineTables:
+        """Splines of mass, lift, damping, carried mass and, of a mechanism that meets the air, the
+        upward force of the air on its bodies."""
+        listed = [self.masses, self.lifts, self.dampings, self.carried]
         columns = np.stack(listed if self.blown is None else [*listed, self.blown], axis=1)
         spline = CubicSpline(self.heights, columns)
         return SplineTables(spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0)))
@@ -189,7 +179,7 @@ def reduce_mechanism(
             [sum(p.way @ f.generalised(p.motion, 0.0) for f in blowing) for p in found]
         )
     reached = np.array([place.height for place in found])
-    return ReducedMechanism(reached, masses, lifts, dampings, name, carried, blown)
+    return ReducedMechanism(reached, masses, lifts, dampings, carried, name, blown)
 
 
 class Places:

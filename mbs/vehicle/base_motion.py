@@ -94,6 +94,11 @@ class BaseMotion:
         self._vertical = [_course(one, "vertical", vehicle, speed) for one in vehicle.vertical]
         self._lateral = [_course(one, "lateral", vehicle, speed) for one in vehicle.lateral]
 
+    @property
+    def along_track(self) -> bool:
+        """Whether its height depends on the place along the track."""
+        return any(along_track for _, along_track in self._vertical)
+
     def vertical(self, time: float) -> Motion:
         """Upward motion at ``time`` [s]."""
         return self._sum(self._vertical, time)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from catenary.base.parallel import on_root
+from catenary.mbs.air import Airflow
 from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
 from catenary.mbs.called_model import CalledModel
 from catenary.mbs.head.head_arrays import N_DRIVE, named
@@ -72,14 +73,20 @@ def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> Leads:
     contact = np.flatnonzero(rake)
     middles, leads, first = [np.zeros(0)], [np.zeros(0)], [0]
     for number in contact.tolist():
-        x, y = wires.course(int(wire[number]))
-        lead = math.tan(rake[number]) * y
-        middle = x - lead
-        ascends = np.append(True, np.diff(np.maximum.accumulate(middle)) > 0.0)
-        middles.append(middle[ascends])
-        leads.append(lead[ascends])
-        first.append(first[-1] + int(ascends.sum()))
+        middle, y = _crossing(wires, int(wire[number]), float(rake[number]))
+        middles.append(middle)
+        leads.append(math.tan(rake[number]) * y)
+        first.append(first[-1] + middle.size)
     return Leads(contact, np.array(first), np.concatenate(middles), np.concatenate(leads))
+
+
+def _crossing(wires: ContactWires, wire: int, rake: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places of the middle of a strip at an angle [rad] to the cross-section, ascending, and where
+    a wire at rest crosses it there, to the left [m], straight in between."""
+    x, y = wires.course(wire)
+    middle = x - math.tan(rake) * y
+    ascends = np.append(True, np.diff(np.maximum.accumulate(middle)) > 0.0)
+    return middle[ascends], y[ascends]
 
 
 class StripEnds(NamedTuple):
@@ -130,6 +137,7 @@ class Pantographs:
     outputs : ``position`` and all these of the latest step one after another
     speed : of the train [m/s]
     places_along : TrainPlaces
+    along_track : whether a base or the air at a pantograph depends on its place, rank 0
     reach : how far contacts are behind and ahead of their pantographs at most [m], all ranks
     ends : StripEnds, contacts of each strip and strips of each pantograph
     work : of the contact forces on this rank's part of the line
@@ -175,9 +183,7 @@ class Pantographs:
             # A wire that is alone is never out of reach: beside the strips it runs on the horns.
             np.repeat(np.repeat(half_length, counts), n_wires) if n_wires > 1 else endless,
         )
-        rake = [
-            placement.data.strips.rake * simulated.raked_strips for placement in train.placements
-        ]
+        rake = [_rake(placement, simulated) for placement in train.placements]
         leads = leads_of(wires, self.candidates.wire, np.repeat(np.repeat(rake, counts), n_wires))
         self.places_along = TrainPlaces(all_start, all_places, leads)
         self._move = native.move_contacts.bound(self.places_along)
@@ -205,6 +211,7 @@ class Pantographs:
         self.joints_in_loop = any(self._has_joints)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
+        self.along_track = False
         self._followed: list[FollowedPath] = []
         on_root(comm, lambda: self._make_all(problem, simulated, nominal_height), takes_long=True)
 
@@ -363,8 +370,11 @@ class Pantographs:
             if not _depends_on_place(placement, simulated):
                 path = None
             elif path is None:
-                path = _lateral_path(problem, placement, base, self._wires)
-            model = _make(problem, simulated, placement, height, self.n_wires, base, path)
+                rake = _rake(placement, simulated)
+                path = _lateral_path(problem, placement, base, self._wires, rake)
+            flow = airflow(problem, simulated, placement)
+            self.along_track |= any(own is not None and own.along_track for own in (base, flow))
+            model = _make(problem, simulated, placement, height, self.n_wires, base, flow, path)
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
@@ -378,6 +388,7 @@ def _make(
     nominal_height: float,
     n_wires: int,
     base: BaseMotion | None,
+    flow: Airflow | None,
     path: CrossingPath | None,
 ) -> Pantograph:
     numerics, train = problem.numerics, problem.train
@@ -386,7 +397,7 @@ def _make(
         placement.static_force,
         nominal_height,
         stepping,
-        airflow(problem, simulated, placement),
+        flow,
         placement.lowering if simulated.lowering else None,
         placement.regulator if simulated.regulated_lift else None,
         simulated.head_roll,
@@ -414,14 +425,23 @@ def _depends_on_place(placement: Placement, simulated: Simulated) -> bool:
     return bends or (simulated.head_roll and placement.data.roll is not None)
 
 
+def _rake(placement: Placement, simulated: Simulated) -> float:
+    """Simulated angle of a pantograph's strips to the cross-section [rad]."""
+    return placement.data.strips.rake * simulated.raked_strips
+
+
 def _lateral_path(
-    problem: Problem, placement: Placement, base: BaseMotion | None, wires: ContactWires
+    problem: Problem,
+    placement: Placement,
+    base: BaseMotion | None,
+    wires: ContactWires,
+    rake: float,
 ) -> CrossingPath:
     """Path on which wires that do not move sideways cross the strips."""
     train = problem.train
     paths = [
         LateralPath(
-            *wires.course(number),
+            *_crossing(wires, number, rake),
             train.start - placement.behind,
             placement.data.strips.offsets,
             train.speed,

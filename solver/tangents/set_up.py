@@ -198,7 +198,8 @@ def set_up_of(
         speed=float(problem.train.speed),
         follows_surface=bool(pantographs.places_along.leads.contact.size)
         or bool(wires.shapes.surface.size),
-        fixed=_fixed_of(model, problem.numerics, links, wires, drives),
+        fixed=_fixed_of(model, problem.numerics, links, wires, drives)
+        | {"how contact forces act on heads": np.concatenate([head.levers for head in heads])},
     )
 
 

@@ -78,7 +78,7 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
         first,
         drives,
         ties=np.array([model.tie for model in models], dtype=native.TIE),
-        one_speed=bool(drives[..., N_DRIVE:].any()),
+        one_speed=pantographs.along_track or bool(drives[..., N_DRIVE:].any()),
         longest_way=end - float(pantographs.places_along.start.max()),
     )
     pantographs.move_to(first * dt)

@@ -139,4 +139,5 @@ def airflow(problem: Problem, simulated: Simulated, placement: Placement) -> Air
         problem.tunnels,
         blowing,
         placement.data.crosswind_factor,
+        sheltered=wind is not None and bool(wind.stretches),
     )

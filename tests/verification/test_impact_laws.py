@@ -166,6 +166,27 @@ def test_linear_spring_and_damper_lose_what_the_oscillator_loses() -> None:
     check("speed [m/s]", found, -rate(end), within=2 * c * speed / MASS * 1e-5 + 1e-4 * speed)
 
 
+def test_a_linear_damper_brakes_before_the_touch() -> None:
+    """From a gap c v / k on, for about c / k: force rises to c v, which takes c^2 / (2 k m) of v.
+
+    To second order in that part; Hertz's spring with hysteresis leaves v as it is.
+    """
+    k, c, speed = 5e4, 120.0, 0.5
+
+    def at_touch(law: LawInSteps) -> float:
+        bounce = Bounce(law, 1e-6)
+        bounce.start(-1.5 * c * speed / k, speed)
+        while bounce.depth <= 0.0:
+            bounce.step()
+        return bounce.velocity
+
+    lost = c**2 / (2.0 * k * MASS)
+    found = at_touch(LinearInSteps(LinearLaw(k, c), 1, pulls=False))
+    check("part of the speed", 1.0 - found / speed, lost, within=2.0 * lost**2)
+    # The step of the touch is part of the contact: K d^1.5 of d = v dt, some 1e-9 of it.
+    check("speed [m/s]", at_touch(hertz(HYSTERESIS["flores"](0.5))), speed, within=1e-6)
+
+
 @pytest.mark.parametrize("name", HYSTERESIS)
 def test_no_cycle_of_contact_creates_energy(name: str) -> None:
     """Pressed by a lift, the ball bounces until it rests: each bounce is lower than the one before.

@@ -32,7 +32,9 @@ OFFSET = 0.103 - 0.010 - WEIGHT / STIFFNESS
 def test_mechanism_that_is_the_same_at_all_heights_is_two_lumped_masses() -> None:
     """The same scheme on the same equations: round-off of heights of 5 m over 2000 steps."""
     same = np.ones(5)
-    frame = ReducedMechanism(np.linspace(0.0, 9.0, 5), 15.0 * same, 190.0 * same, 90.0 * same)
+    frame = ReducedMechanism(
+        np.linspace(0.0, 9.0, 5), 15.0 * same, 190.0 * same, 90.0 * same, 15.0 * same
+    )
     data = RaisingData(frame, 7.2, 4200.0, 10.0, 70.0, 0.1, 0.2)
     found = RaisingPantograph(data, Stepping(raise_time=0.5, dt=1e-3))
     lumped = LumpedData((7.2, 15.0), (4200.0, 0.0), (10.0, 90.0))
@@ -65,7 +67,7 @@ def test_strips_roll_and_a_moving_base_are_the_same_for_both_models() -> None:
     """
     same = np.ones(5)
     frame = ReducedMechanism(
-        np.linspace(0.0, 9.0, 5), 15.0 * same, 190.0 * same, 90.0 * same, carried=15.0 * same
+        np.linspace(0.0, 9.0, 5), 15.0 * same, 190.0 * same, 90.0 * same, 15.0 * same
     )
     own = Suspension(0.8, 9000.0, 20.0)
     strips = Strips(2, 0.5, 1.6, own, Turning(0.3, 90.0, 2.0))

@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measuring import check, march
+from mpi4py import MPI
 from scipy.optimize import brentq
 from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.head.strips import Strips
+from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
+from catenary.mbs.head.strips import Strips, Turning
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.pantographs import TrainPlaces, leads_of
+from catenary.solver.contact.pantographs import Pantographs, TrainPlaces, leads_of
 from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
@@ -84,3 +86,35 @@ def test_contacts_are_where_a_straight_strip_crosses_a_zigzag(rake: float) -> No
             expected = brentq(misses, middle - 1.0, middle + 1.0, xtol=1e-13)
             assert places[at] == pytest.approx(expected, abs=1e-11)
         assert places[1] == start[1] + way and places[3] == start[3] + way
+
+
+@pytest.mark.parametrize("rake", [RAKE, -math.radians(40.0)])
+def test_a_head_that_rolls_is_pressed_where_the_wire_crosses_its_raked_strips(rake: float) -> None:
+    """The contact is ahead of the strip's middle, and so is the stagger that is its lever.
+
+    Along the contact's way x = m + tan(r) y(x) the lever changes by y' V / (1 - tan(r) y').
+    """
+    stagger, speed, start = (0.2, -0.3, 0.25, 0.25, -0.2), 70.0, 70.0
+    plain = problem(stagger, rake, start, NAMES | {"head_roll"})
+    strips = plain.train.placements[0].data.strips
+    rolling = replace(EN_PANTOGRAPH, strips=strips, roll=Turning(2.0, 470.0, 1.0))
+    own = replace(plain, train=train(speed, start, start + 60.0, data=rolling))
+    model, form = find_form(own, mesh_of(own.line, 2))
+    wires = ContactWires(model, form, distribute(model, 1, 0))
+    heads = Pantographs(MPI.COMM_SELF, own, model.simulated, wires, lambda _: 5.05)
+    times = np.arange(1, 800) * 1e-3
+    drives = np.zeros((times.size, 1, drive_width(2)))
+    heads.fill_drives(times, drives)
+    supports = SPAN * np.arange(len(stagger))
+    slopes = np.diff(stagger) / SPAN
+    for number, offset in enumerate(strips.offsets):
+        middles = start + offset + speed * times
+        places = middles + math.tan(rake) * np.interp(middles, supports, stagger)
+        for _ in range(20):  # each time the error falls by tan(r) y' = 0.007
+            places = middles + math.tan(rake) * np.interp(places, supports, stagger)
+        slope = slopes[np.searchsorted(supports, places) - 1]
+        place, rate = drives[:, 0, N_DRIVE + number], drives[:, 0, N_DRIVE + 2 + number]
+        check("lever [m]", place, np.interp(places, supports, stagger), within=1e-12)
+        expected = speed * slope / (1.0 - math.tan(rake) * slope)
+        check("its rate [m/s]", rate, expected, within=1e-10)
+    assert np.ptp(place) > 0.3

@@ -324,6 +324,20 @@ TWO = ["line.n_spans=6", "evaluation.from_m=160", "evaluation.to_m=220",
        "train.pantographs.1.name=three_masses", "train.pantographs.1.behind_m=100"]  # fmt: skip
 HEAD = "pantographs.reference"
 DAMPER = f'{HEAD}.laws=[{{type="damper",at_mass=2,up_N_s_per_m=60.0,down_N_s_per_m=120.0}}]'
+LIMITER = (
+    f"{HEAD}.laws=[{{type='limiter',rise_m=0.002,stiffness_N_per_m=5e3}}] "
+    f"{HEAD}.nominal_height_m=5.0"
+).split()
+BENDING = [
+    f"{HEAD}.strips={{number=2,spacing_m=0.5,length_m=1.6,mass_kg=1.5,stiffness_N_per_m=8000.0,"
+    "damping_N_s_per_m=10.0,flexure={bending_stiffness_N_m2=400.0,spring_distance_m=0.8}}",
+    f"{HEAD}.roll={{inertia_kg_m2=2.0,spring_distance_m=0.67}}",
+    "line.stagger_m=0.2",
+    "effects.head_roll=true",
+]
+PITCHING = (
+    f"{HEAD}.strips={{number=2,spacing_m=0.5,pitch_inertia_kg_m2=0.5,pitch_spring_distance_m=0.4}}"
+)
 # At all supports, of which that at 180 m is 10 mm higher.
 HEIGHTS = [[60.0 * number, 0.01 * (number == 3)] for number in range(7)]
 # A case, how it is changed, and parameters with steps of differences in parts of them.
@@ -359,6 +373,22 @@ SCENES: dict[str, tuple[str, list[str], dict[str, float]]] = {
         "en50318_2002",
         [*SHORT, DAMPER],
         {f"{HEAD}.masses_kg.1": 1e-4, "line.contact_wire.tension_N": 1e-5},
+    ),
+    "limiter": (
+        "en50318_2002",
+        [*SHORT, *LIMITER],
+        {f"{HEAD}.nominal_height_m": 1e-7, f"{HEAD}.laws.0.rise_m": 1e-5},
+    ),
+    "strips that bend on a head that rolls": (
+        "en50318_2002",
+        [*SHORT, *BENDING],
+        {
+            f"{HEAD}.masses_kg.1": 1e-5,
+            f"{HEAD}.stiffnesses_N_per_m.1": 1e-4,
+            f"{HEAD}.roll.inertia_kg_m2": 1e-4,
+            f"{HEAD}.strips.flexure.bending_stiffness_N_m2": 4e-5,
+            f"{HEAD}.static_force_N": 1e-5,
+        },
     ),
     "two pantographs": (
         "ac_simple",
@@ -586,3 +616,18 @@ def test_what_is_not_differentiated_is_refused() -> None:
     finer = line_at_rest(problem, mesh_of(problem.line, 3))
     with pytest.raises(InputError, match="the mesh changes the number of unknowns"):
         differentiate(lambda by: set_up_of(COMM, finer), now, 1.0, "the mesh")
+
+
+@pytest.mark.parametrize(
+    ("strips", "key"),
+    [
+        (BENDING, "length_m"),
+        ([PITCHING], "spacing_m"),
+    ],
+)
+def test_a_parameter_by_which_forces_meet_heads_otherwise_is_refused(
+    strips: list[str], key: str
+) -> None:
+    """Modes of a longer strip, and levers of strips farther from each other."""
+    with pytest.raises(InputError, match="changes how contact forces act on heads"):
+        marched_scene("en50318_2002", [*SHORT, *strips], [f"{HEAD}.strips.{key}"])

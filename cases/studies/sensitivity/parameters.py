@@ -70,6 +70,9 @@ _CHANGES_OF_FORCES = {"tension_N": 1e3, "force_N": 1.0}
 # Step of the differences by which set-ups are differentiated, in parts of the value: of the fourth
 # order they are off by 4 step^4, some 1e-12, and by round-off over the step, 1e-13 to 1e-10.
 _STEP = 1e-3
+# Of a height of 5 m, which moves laws of pantographs as a whole: a part of it would lead beyond
+# their bends, as a limiter's. In it a set-up is linear, and known to 1e-15 m.
+_STEP_OF_HEIGHT = 1e-6
 _STEP_OF_ZERO = {"mm": 0.05}
 _USUAL_STEP_OF_ZERO = 1e-4
 # Tables without anything of the march.
@@ -129,6 +132,8 @@ class Parameter:
         """Step by which it is changed to differentiate set-ups, in its unit."""
         if self.is_of_shape:
             return max(_STEP * self.size, _STEP_OF_ZERO["mm"])
+        if self.key.endswith("nominal_height_m"):
+            return _STEP_OF_HEIGHT
         if self.size > 0.0:
             return _STEP * self.size
         return _STEP_OF_ZERO.get(self.unit, _USUAL_STEP_OF_ZERO)

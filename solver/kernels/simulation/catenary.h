@@ -44,8 +44,8 @@ CATENARY_API double catenary_time(const catenary_simulation* simulation);
 CATENARY_API double catenary_time_step(const catenary_simulation* simulation);
 CATENARY_API int64_t catenary_steps_left(const catenary_simulation* simulation);
 /* Way of the train since time zero, and its speed; another one holds from the next step on. It is
- * refused, with a value other than 0, if the file has the places of wires across the track, which
- * holds for one speed only. */
+ * refused, with a value other than 0, if the file has what pantographs meet at their places at one
+ * speed: wires across their strips, the track below the vehicle, tunnels, stretches of the wind. */
 CATENARY_API double catenary_way(const catenary_simulation* simulation);
 CATENARY_API double catenary_speed(const catenary_simulation* simulation);
 CATENARY_API int catenary_set_speed(catenary_simulation* simulation, double speed);

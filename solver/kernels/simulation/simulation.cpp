@@ -145,10 +145,8 @@ void Simulation::drive_next() {
         drive.roof += input.base;
         drive.roof_velocity += input.base_velocity;
         drive.head_air += input.head_force;
-        heads_[k]->set_added_force(input.lift_force);
-        // Rows of chains without a controller do not state the part of its force that acts.
-        if (input.lift_force != 0.0 && line_.heads[k].linear && !line_.heads[k].regulation)
-            drive.part = 1.0;
+        // In full at all times, unlike what a regulation of the scene adds.
+        (line_.heads[k].mechanism ? drive.arm_air : drive.force) += input.lift_force;
     }
 }
 

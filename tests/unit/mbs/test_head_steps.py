@@ -25,6 +25,7 @@ FRAME = ReducedMechanism(
     20.0 + 6.0 * HEIGHTS**2,
     230.0 + 30.0 * np.sin(4 * HEIGHTS),
     60.0 + 9.0 * HEIGHTS,
+    20.0 * np.ones_like(HEIGHTS),
     name="tall",
 )
 RAISING = RaisingData(FRAME, 7.8, 6000.0, 26.0, 76.0, 0.08, base_height=3.6)

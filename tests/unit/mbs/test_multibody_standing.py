@@ -66,6 +66,14 @@ def test_telescope_stands_as_its_weights_and_springs_say() -> None:
     assert "2 bodies, 2 joints, 1 of 2 degrees of freedom is the raising" in describe(DATA)
 
 
+@pytest.mark.parametrize("height", [0.7, 1.1, 1.3])
+def test_a_head_rides_on_its_arm_to_any_working_height(height: float) -> None:
+    """Of a mast that is raised to the head's given place, or past it."""
+    standing = stand(replace(DATA, working_height=height))
+    check("above the mast [m]", standing.head.offset, FREE - HEAD * G / STIFFNESS, within=1e-9)
+    check("jack [N]", standing.actuator_force, FORCE + (MAST + HEAD) * G, within=1e-6)
+
+
 def test_telescope_is_reduced_to_its_mast() -> None:
     tables = reduced(DATA)
     check("ends [m]", (tables.heights[0], tables.heights[-1]), (0.4, 1.6), within=1e-9)
