@@ -41,8 +41,12 @@ class Interrupted(RunBroken):
     """A signal ended a run before or after its march; the same on all ranks."""
 
 
-class _Wish:
-    """The signal that came first, and what the next one is to do. One for the process."""
+class _Wish(threading.local):
+    """The signal that came first, and what the next one is to do.
+
+    Python calls handlers in the main thread alone: runs in other threads neither see its signals
+    nor change what they do.
+    """
 
     def __init__(self) -> None:
         self.number = 0
