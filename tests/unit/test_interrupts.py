@@ -192,6 +192,19 @@ def test_other_programs_get_their_handlers_back() -> None:
         assert not stop()
 
 
+def test_a_second_signal_goes_to_the_handler_of_the_other_program() -> None:
+    """It ended the process, and with it all that a notebook holds."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    interrupts._wish.__init__()  # type: ignore[misc]
+    with pytest.raises(KeyboardInterrupt), StopRequest() as stop:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert stop()
+        os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with StopRequest() as stop:
+        assert not stop()
+
+
 @pytest.mark.process
 def test_libraries_leave_the_handlers_as_they_are(tmp_path: Path) -> None:
     """PETSc and Gmsh set handlers of their own when they start."""
