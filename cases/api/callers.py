@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,20 @@ def communicator(comm: Any) -> Any:
             raise InputError(f"comm is {shown(comm)}; it must be a communicator of mpi4py")
         return comm
     return world() if launched_by_mpirun() else alone()
+
+
+def refuse_different(comm: Any, *given: object) -> None:
+    """Raise InputError on all processes unless all give the same to what they do together.
+
+    Collective. ``given`` has texts that tell of its values. Different scenes would wait for each
+    other without end, or mix.
+    """
+    own = blake2b(repr(given).encode(errors="replace")).digest()
+    if comm.size > 1 and len(set(comm.allgather(own))) > 1:
+        raise InputError(
+            "the processes of mpirun do this together, but differ in scene, values or folder: "
+            "give all the same, or comm=MPI.COMM_SELF for one of each process's own"
+        )
 
 
 @contextmanager

@@ -53,11 +53,6 @@ class Run:
     pandas, with the columns of ``summary.json``. An array is read when it is asked for.
     Under mpirun each process has its own: not collective.
 
-    Attributes
-    ----------
-    plot : Pictures
-        Draws the pictures of the report.
-
     Examples
     --------
     >>> run.outcome, run.passed in (True, False, None)
@@ -79,7 +74,6 @@ class Run:
         self._folder = folder
         self._ended = ended
         self._is_closed = False
-        self.plot = Pictures(lambda: self._results, lambda: self._evaluated)
 
     @cached_property
     def _file(self) -> Results:
@@ -92,6 +86,17 @@ class Run:
         if self._is_closed:
             raise InputError("this run is closed; read tables before, or open its folder again")
         return self._file
+
+    @property
+    def plot(self) -> Pictures:
+        """Draws the pictures of the report.
+
+        Examples
+        --------
+        >>> figure = run.plot.force()
+        """
+        # Not kept: a run that no name holds any more closes its file and frees its memory at once.
+        return Pictures(lambda: self._results, lambda: self._evaluated)
 
     @property
     def folder(self) -> Path | None:

@@ -18,11 +18,12 @@ from catenary.callers import (
     number_of,
     path_of,
     progress_shown,
+    refuse_different,
     temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.result_folder.output_folder import run_folder
-from catenary.scenes import SceneLike, checked
+from catenary.scenes import SceneLike, checked, draft_of, scene_of
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene as CheckedScene
@@ -67,7 +68,8 @@ def run(
     Raises
     ------
     InputError
-        If the scene is wrong or too large, or if ``out`` cannot be taken.
+        If the scene is wrong or too large, if ``out`` cannot be taken, or if processes differ in
+        them.
     RunBroken
         If the run cannot go on. What it recorded up to there is in ``out``, and in the attribute
         ``run`` of the error.
@@ -80,7 +82,9 @@ def run(
     >>> bool(100 < run.statistics.mean_N["pantograph"] < 130)
     True
     """
-    given, tables, comm = folder_of(out), checked(scene), communicator(comm)
+    own, given, comm = scene_of(scene), folder_of(out), communicator(comm)
+    tables = checked(own)
+    refuse_different(comm, draft_of(own).raw, given)
     in_memory = given is None
     with _set_up(tables, progress, comm) as options, ExitStack() as stack:
         folder = given or stack.enter_context(temporary_folder(comm, "run"))
@@ -142,6 +146,7 @@ def restart(
     if evaluate is not None:
         places: Any = evaluate if np.ndim(evaluate) else [evaluate]
         stretch = ":".join(map(str, places))
+    refuse_different(comm, own, until, stretch)
 
     tables = on_root(comm, lambda: scene_to_continue(own, until, stretch), takes_long=True)
     with _set_up(tables, progress, comm) as options:

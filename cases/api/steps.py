@@ -6,7 +6,7 @@ import operator
 import tempfile
 from hashlib import blake2b, file_digest
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -430,11 +430,17 @@ class Simulation:
         """
         if not isinstance(self._own, _Closed):
             self._own = _Closed(self._own.time)  # type: ignore[assignment]
+            self._ended = False  # what it is now is closed
 
     def __repr__(self) -> str:
         closed = isinstance(self._own, _Closed)
         left = "closed" if closed else f"{self.steps_left} steps left"
         return f"<catenary.Simulation at {self.time:g} s, {left}>"
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a Simulation cannot be pickled: prepare() a file *.line, and open it in each process"
+        )
 
     def __enter__(self) -> Simulation:
         return self

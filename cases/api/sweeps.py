@@ -16,6 +16,7 @@ from catenary.callers import (
     listed,
     n_at_once,
     progress_shown,
+    refuse_different,
     say_nothing,
     say_on_error_stream,
     temporary_folder,
@@ -91,7 +92,8 @@ def sweep(
     Raises
     ------
     InputError
-        If a key, a value or a distribution is wrong, or if no variant can be run.
+        If a key, a value or a distribution is wrong, if no variant can be run, or if processes
+        differ in what they give.
     KeyboardInterrupt
         If a signal ended it. With ``out`` the same call goes on.
 
@@ -114,6 +116,7 @@ def sweep(
         raise InputError("sample makes all variants itself: give vary or sample, not both")
     else:
         variants, sampling = samples_of(sample, draft)
+    refuse_different(comm, draft.raw, variants, given)
     say = say_on_error_stream if progress else say_nothing
     with ExitStack() as stack:
         folder = given or stack.enter_context(temporary_folder(comm, "sweep"))

@@ -52,8 +52,12 @@ def _complain_of_usage(error: Any) -> None:
             error.show()
         return
     sentence = error.format_message().rstrip(".")
-    command = context.command_path if context is not None else "catenary"
-    console.complain(f"{sentence}; see `{command} --help`")
+    if context is not None:
+        command = context.command_path
+    else:  # an option without its value
+        command = " ".join(["catenary", *(word for word in sys.argv[1:2] if word[:1] != "-")])
+    sentence = sentence.replace(". Did you mean", "; did you mean")
+    console.complain(f"{sentence}{' ' if sentence[-1] == '?' else '; '}see `{command} --help`")
 
 
 def main() -> None:

@@ -2,7 +2,8 @@
 
 The first one is remembered while the march goes on, which then ends with its next step. In other
 phases it ends the work on one rank at once, and on several when all ranks have come to the same
-place, or by aborting all. The second one ends the process.
+place, or by aborting all. The second one ends the process, or in another Python program does what
+its own handler does.
 """
 
 from __future__ import annotations
@@ -41,8 +42,12 @@ class Interrupted(RunBroken):
     """A signal ended a run before or after its march; the same on all ranks."""
 
 
-class _Wish:
-    """The signal that came first, and what the next one is to do. One for the process."""
+class _Wish(threading.local):
+    """The signal that came first, and what the next one is to do.
+
+    Python calls handlers in the main thread alone: runs in other threads neither see its signals
+    nor change what they do.
+    """
 
     def __init__(self) -> None:
         self.number = 0
@@ -50,6 +55,7 @@ class _Wish:
         self.remembering = 0
         self.installed = False
         self.several_ranks = False
+        self.before: dict[int, Any] = {}  # handlers of another program, back after its run
 
 
 _wish = _Wish()
@@ -72,7 +78,7 @@ def _handle(number: int, frame: FrameType | None) -> None:
         repeated = number == _wish.number != signal.SIGINT
         if repeated and time.monotonic() - _wish.at < _SAME:
             return
-        signal.signal(number, signal.SIG_DFL)
+        signal.signal(number, _wish.before.get(number, signal.SIG_DFL))
         os.kill(os.getpid(), number)
         return
     _wish.number, _wish.at = number, time.monotonic()
@@ -177,7 +183,7 @@ class StopRequest:
     """
 
     def __init__(self) -> None:
-        self._before: dict[int, Any] = {}
+        self._installed = False
         self._scope = _remembered()
 
     def __call__(self) -> bool:
@@ -187,13 +193,14 @@ class StopRequest:
     def __enter__(self) -> StopRequest:
         self._scope.__enter__()
         if not _wish.installed and threading.current_thread() is threading.main_thread():
-            self._before = {number: signal.getsignal(number) for number in STOPPING}
+            _wish.before = {number: signal.getsignal(number) for number in STOPPING}
+            self._installed = True
             install(several_ranks=False)
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
-        if self._before:
-            for number, handler in self._before.items():
+        if self._installed:
+            for number, handler in _wish.before.items():
                 signal.signal(number, handler)
-            _wish.installed, _wish.number = False, 0
+            _wish.before, _wish.installed, _wish.number = {}, False, 0
         self._scope.__exit__(None, None, None)

@@ -8,6 +8,7 @@ import itertools
 import re
 import shlex
 import sys
+import threading
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ _OTHER_OPTIONS = (
     "options_left", "options_view", "malloc_debug", "malloc_dump", "malloc_view", "memory_view",
 )  # fmt: skip
 
+# PETSc is a module before it has started: another thread that asked for options crashed.
+_starting = threading.Lock()
 # Kinds of output that PETSc has at the end of a run, when no error can be refused any more.
 _VIEWERS = {
     "-log_view": ("", "ascii"),
@@ -138,12 +141,13 @@ def options_of(table: Mapping[str, Any]) -> Iterator[list[str]]:
     For programs that run several scenes: what the table changed is as before afterwards.
     """
     before = {}
-    if "petsc4py.PETSc" in sys.modules:
-        from catenary.base.petsc import PETSc
+    with _starting:
+        if "petsc4py.PETSc" in sys.modules:
+            from catenary.base.petsc import PETSc
 
-        before = PETSc.Options().getAll()
-    arguments = as_arguments(table)
-    start_petsc(arguments)
+            before = PETSc.Options().getAll()
+        arguments = as_arguments(table)
+        start_petsc(arguments)
     try:
         yield arguments
     finally:

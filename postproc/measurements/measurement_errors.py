@@ -65,9 +65,12 @@ def errors_of(
         yield Finding("gain", name, text, gain.value)
     spread = float(np.std(run.below(passage.cut_off)(run.position)))
     if found.filter_certainty > CERTAIN and found.filter_effect > _FILTER_SHARE * spread:
-        stated = f"{passage.cut_off:g} Hz" if passage.is_filtered else "none"
+        taken = f"filtered at {passage.cut_off:g} Hz" if passage.is_filtered else "unfiltered"
         seems = "no filter" if found.filter is None else f"a filter of {found.filter:.3g} Hz"
-        text = f"{name}: the values seem to have passed {seems}; the description states {stated}"
+        text = (
+            f"{name}: the values seem to have passed {seems}, and are taken for {taken} "
+            "(is_filtered and filter_Hz of a description)"
+        )
         value = np.inf if found.filter is None else found.filter
         yield Finding("filter", name, text, float(value))
 

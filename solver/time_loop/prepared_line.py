@@ -85,7 +85,7 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
     try:
         blocks.steps().write(str(path), ahead)
     except RuntimeError as error:
-        raise RunBroken(f"{path}: {error}") from error
+        raise RunBroken(f"{path}: {error}: free some space or choose another file") from error
 
 
 def make_room(scheme: OneSolve) -> None:

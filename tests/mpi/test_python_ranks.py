@@ -55,6 +55,23 @@ def test_all_ranks_are_told_what_is_wrong(scene: catenary.Scene) -> None:
     assert agree(str(found.value))
 
 
+@pytest.mark.skipif(COMM.size == 1, reason="one process agrees with itself")
+def test_processes_that_differ_are_told_so(scene: catenary.Scene, tmp_path: Path) -> None:
+    """A study that takes ``run`` for a function of one process waited without end, or mixed two."""
+    own = scene.replace(train={"speed_km_h": 240 + COMM.rank})
+    ends = [243.0 + COMM.rank]
+    for call in (
+        lambda: catenary.run(own),
+        lambda: catenary.run(scene, tmp_path / str(COMM.rank)),
+        lambda: catenary.restart(tmp_path / str(COMM.rank)),
+        lambda: catenary.sweep(own, {"train.end_m": [243.0]}),
+        lambda: catenary.sweep(scene, {"train.end_m": ends}),
+    ):
+        with pytest.raises(catenary.InputError, match="give all the same, or comm=MPI.COMM_SELF"):
+            call()
+    assert catenary.run(own, comm=MPI.COMM_SELF).scene["train.speed_km_h"] == 240 + COMM.rank
+
+
 def test_each_rank_may_ask_for_itself(scene: catenary.Scene, tmp_path: Path) -> None:
     """Functions that are not collective, with a folder of each rank."""
     folder = tmp_path / str(COMM.rank)

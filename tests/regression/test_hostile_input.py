@@ -216,7 +216,9 @@ def test_a_case_without_a_name_is_told(case: str) -> None:
         (["run", "ac_simple"], "Missing option"),
         (["run", "ac_simple", "-o", "out", "--no-such"], "No such option: --no-such"),
         (["nonsense"], "No such command 'nonsense'"),
+        (["runn"], "No such command 'runn'; did you mean 'run'? see `catenary --help`"),
         (["plan"], "Missing argument"),
+        (["check", "tramway", "--set"], "Option '--set' requires an argument; see `catenary check"),
     ],
 )
 def test_a_usage_error_is_one_sentence(words: list[str], expected: str, tmp_path: Path) -> None:
@@ -305,7 +307,8 @@ def test_fifos_and_devices_are_refused_at_once(tmp_path: Path) -> None:
     for name in ("pipe", "/dev/zero", "/dev/tty", "."):
         words = [f'vehicle.vertical.by_time_file="{name}"', "effects.vehicle_motion=true"]
         told = refusal("plan", str(SOUND), "--set", *words)
-        assert "cannot be read: it is no regular file" in told or "no such device" in told
+        kind = "a folder" if name == "." else "no regular file"
+        assert f"cannot be read: it is {kind}" in told or "no such device" in told
         words = [f'mesh.file="{name}"', "mesh.elements_per_gap="]
         assert "there is no such file" in refusal("plan", str(SOUND), "--set", *words)
         assert "no case file" in refusal("plan", name)

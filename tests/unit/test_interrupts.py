@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -147,6 +148,28 @@ def test_what_a_terminal_sends_twice_is_one_wish() -> None:
         assert stop()
 
 
+def test_runs_in_other_threads_leave_signals_to_the_main_thread() -> None:
+    entered, leave = threading.Event(), threading.Event()
+
+    def other_run() -> None:
+        with Phase(MPI.COMM_SELF, "the mesh was made", "nothing was written"):
+            entered.set()
+            assert leave.wait(60)
+
+    thread = threading.Thread(target=other_run)
+    thread.start()
+    assert entered.wait(60)
+    try:
+        with StopRequest() as stop:
+            os.kill(os.getpid(), signal.SIGINT)  # raises Stopped where the thread has changed it
+            assert stop()
+            leave.set()
+            thread.join()
+    finally:
+        leave.set()
+    assert not interrupts._wish.remembering
+
+
 def test_a_signal_outside_of_a_run_is_raised_as_no_library_catches_it() -> None:
     with pytest.raises(Stopped) as caught:
         try:
@@ -165,6 +188,19 @@ def test_other_programs_get_their_handlers_back() -> None:
         os.kill(os.getpid(), signal.SIGTERM)
         assert stop()
     assert mine == {number: signal.getsignal(number) for number in STOPPING}
+    with StopRequest() as stop:
+        assert not stop()
+
+
+def test_a_second_signal_goes_to_the_handler_of_the_other_program() -> None:
+    """It ended the process, and with it all that a notebook holds."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    interrupts._wish.__init__()  # type: ignore[misc]
+    with pytest.raises(KeyboardInterrupt), StopRequest() as stop:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert stop()
+        os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     with StopRequest() as stop:
         assert not stop()
 

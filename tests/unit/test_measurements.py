@@ -115,6 +115,17 @@ def test_an_offset_is_told_unless_it_is_a_stated_bias(run: Path, table: pd.DataF
     assert found_in(run, table, measured=stated).findings == []
 
 
+def test_a_filter_that_was_taken_for_granted_is_told_as_such(
+    run: Path, table: pd.DataFrame
+) -> None:
+    with Results(run) as results:
+        position, force = (results.column(f"contact_{of}", 0) for of in ("position", "force"))
+    raw = np.interp(table.place_m, position, force)
+    found = found_in(run, table.assign(force_N=raw), measured=PLACES)
+    (text,) = (one.text for one in found.findings if one.kind == "filter")
+    assert "no filter, and are taken for filtered at 20 Hz (is_filtered" in text
+
+
 def test_noise_that_was_stated_is_beside_what_remains(run: Path, table: pd.DataFrame) -> None:
     told = {noise: found_in(run, table, measured={**PLACES, "force": {
         "column": "force_N", "noise": noise}}).remarks for noise in (2.0, 0.5)}  # fmt: skip

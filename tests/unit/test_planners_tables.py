@@ -126,7 +126,7 @@ def test_files_beside_a_case_are_found_from_anywhere(tmp_path: Path) -> None:
         ("spans.csv", "span\n1\n", "it has no column span_m: its first line names the columns"),
         ("spans.csv", "spam_m\n55\n", "did you mean span_m?"),
         ("spans.csv", "span_m\n", "it holds no line of numbers below the names of columns"),
-        ("spans.csv", "span_m\n55\nlong\n", "its line 3 must hold a number for each of span_m"),
+        ("spans.csv", "span_m\n55\n60 m\n", 'a number for each of span_m, and is "60 m"'),
         ("spans.csv", "span_m\n55\nnan\n", "its line 3 must hold a number for each of span_m"),
         ("spans.csv", "span,span_m\n1,55\n3,55\n", "its line 3 must be about span 2"),
         ("spans.csv", "span_m,span_m\n55,55\n", "it has several columns span_m"),

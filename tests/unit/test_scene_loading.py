@@ -97,6 +97,8 @@ def test_an_empty_value_takes_a_key_away() -> None:
     )
     assert problem_of(scene).train.placements[0].static_force == 140.0
     assert load_scene("ac_simple", ["numerics.dt_s="]).numerics.dt_s == 1e-3
+    absent = ["wind.gusts=", "vehicle.suspension.lateral=", "train.pantographs.1.behind_m="]
+    assert load_scene("ac_simple", absent).model_dump() == load_scene("ac_simple").model_dump()
 
 
 def test_a_second_pantograph_is_appended_by_its_number() -> None:

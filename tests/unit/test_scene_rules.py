@@ -158,7 +158,7 @@ REFUSED: dict[str, tuple[list[str], str]] = {
         ['evaluation.own_rules={name="x", title="y", criteria=[]}'],
         "evaluation.own_rules on the command line (--set) has criteria = []; it ",
     ),
-    "rules no list": (['evaluation.rules="tsi_ene"'], "it must be a list"),
+    "rules no list": (['evaluation.rules="tsi_ene"'], "it must be a list, in brackets"),
 }
 
 

@@ -278,7 +278,8 @@ def _rows(path: Path, where: str, columns: dict[str, bool]) -> list[tuple[int, d
             values = []
         if len(values) != len(named) or not all(map(math.isfinite, values)):
             raise InputError(
-                f"{where}; its line {number} must hold a number for each of {', '.join(named)}"
+                f"{where}; its line {number} must hold a number for each of {', '.join(named)}, "
+                f"and is {shown(line)}"
             )
         rows.append((number, dict(zip(named, values, strict=True))))
     if not rows:

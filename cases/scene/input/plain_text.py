@@ -33,9 +33,11 @@ def read_whole(path: Path, name: str) -> bytes:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:
         raise InputError(f"{name} cannot be read: {_why(error)}") from error
-    if not stat.S_ISREG(os.fstat(handle).st_mode):
+    mode = os.fstat(handle).st_mode
+    if not stat.S_ISREG(mode):
         os.close(handle)
-        raise InputError(f"{name} cannot be read: it is no regular file")
+        kind = "a folder" if stat.S_ISDIR(mode) else "no regular file"
+        raise InputError(f"{name} cannot be read: it is {kind}")
     with os.fdopen(handle, "rb") as stream:
         try:
             content = stream.read(MOST_BYTES + 1)
@@ -64,7 +66,8 @@ def decode(content: bytes, name: str) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError(
-            f"{name} is not a text file in UTF-8 (byte {error.start}, in line {line})"
+            f"{name} is not a text file in UTF-8 (byte {error.start}, in line {line}); "
+            "save it in UTF-8"
         ) from None
 
 

@@ -109,11 +109,15 @@ def assign(raw: dict[str, Any], key: str, value: Any, where: str = COMMAND_LINE)
         if isinstance(here, list):
             place: Any = _index(here, parts, depth, where)
             if place == len(here):
+                if value is REMOVED:
+                    return  # nothing to take away
                 here.append({})
         elif isinstance(here, dict):
             place = part
-            if not last:
-                here.setdefault(part, {})
+            if not last and part not in here:
+                if value is REMOVED:
+                    return
+                here[part] = {}
         else:
             above = ".".join(parts[:depth])
             raise InputError(

@@ -53,7 +53,7 @@ _WANTED: dict[str, Callable[[dict[str, Any]], str]] = {
     "int_from_float": lambda c: "must be a whole number",
     "bool_type": lambda c: "must be true or false",
     "string_type": lambda c: "must be text",
-    "list_type": lambda c: "must be a list",
+    "list_type": lambda c: "must be a list, in brackets",
     "dict_type": lambda c: "must be a table",
     "model_type": lambda c: "must be a table",
     "literal_error": lambda c: f"must be {c['expected'].replace(chr(39), '')}",

@@ -14,7 +14,7 @@ CONTENTS = {
     "words": (b"time,place\nsoon,there\n", "its line 2 must hold two numbers"),
     "semicolons": (b"0;0\n1;0.01\n2;0\n", "its line 2 must hold two numbers"),
     "three columns": (b"0,0,0\n1,0,0\n", "its line 2 must hold two numbers"),
-    "no text": (bytes(range(256)), "it is not a text file in UTF-8"),
+    "no text": (bytes(range(256)), "in UTF-8 (byte 128, in line 2); save it in UTF-8"),
     "one pair": (b"0,0\n", "{file}; it must have at least 4 entries"),
     "not a number": (b"0,0\n1,nan\n2,0\n99,0\n", "by_time.1.1 is nan in {file}"),
     "endless": (b"0,0\n1,0\n2,0\ninf,0\n", "by_time.3.0 is inf in {file}"),

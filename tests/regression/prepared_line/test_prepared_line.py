@@ -232,7 +232,7 @@ def test_line_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     with pytest.raises(RunBroken, match="cannot be written"):
         prepare_line(acting_scene("ac_simple"), tmp_path / "no/a.line")
     if Path("/dev/full").exists():
-        with pytest.raises(RunBroken, match="to its end"):
+        with pytest.raises(RunBroken, match="to its end: free some space"):
             prepare_line(acting_scene("ac_simple"), Path("/dev/full"))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import gc
 import json
 import logging
 import os
@@ -11,6 +12,7 @@ import signal
 import tempfile
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -156,6 +158,20 @@ def test_a_closed_run_says_so(in_memory: catenary.Run, folder: Path) -> None:
         with pytest.raises(catenary.InputError, match="this run is closed"):
             read()
     assert run.outcome == "done" and run.scene["train.end_m"] == 260.0 and str(folder) in repr(run)
+
+
+def test_a_run_that_no_name_holds_is_closed_at_once(folder: Path) -> None:
+    """Its file can then be continued, and programs that make hundreds of runs do not grow."""
+    gc.collect()
+    gc.disable()  # which would come at some time or other
+    try:
+        run = catenary.open(folder)
+        assert run.outcome == "done" and run.statistics.size and run.force.size and run.plot.names
+        held = weakref.ref(run)
+        del run
+        assert held() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("kept", ["in memory", "in a folder"])

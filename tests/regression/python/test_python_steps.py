@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -254,3 +255,15 @@ def test_a_closed_simulation_says_so(scene: catenary.Scene) -> None:
     sim.close()
     with pytest.raises(catenary.InputError, match="is closed"):
         sim.step()
+
+
+def test_a_simulation_that_was_closed_at_the_end_of_the_line_says_so(scene: catenary.Scene) -> None:
+    with catenary.Simulation(scene) as sim:
+        assert not sim.step(10**9)
+    with pytest.raises(catenary.InputError, match="is closed"):
+        sim.step()
+
+
+def test_a_simulation_says_what_to_do_where_it_is_to_be_pickled(scene: catenary.Scene) -> None:
+    with catenary.Simulation(scene) as sim, pytest.raises(TypeError, match=r"prepare\(\) a file"):
+        pickle.dumps(sim)
