@@ -27,9 +27,7 @@ from catenary.solver.problem.problem import steps_of
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import find_crossings
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.time_loop.compiled_steps import Block, KeptMotions, StepParts
 from catenary.solver.time_loop.prepared_line import make_room, stepped_by_kernels
-from catenary.solver.time_loop.views.step_views import Shown
 from catenary.solver.window.moving_columns import Columns
 
 # Steps between two looks at signals.
@@ -173,7 +171,7 @@ def _steps(
     problem = coupling.inner.problem(affine(strips, n), scheme.share)
     rows = np.zeros((n_steps + 1, pantographs.outputs.size))
     rows[0] = pantographs.outputs
-    parts = StepParts(
+    parts = native.StepParts(
         speed=float(pantographs.speed),
         train=pantographs.places_along,
         contacts=scheme.interaction.contacts,
@@ -192,8 +190,10 @@ def _steps(
     )
     nothing = np.zeros(0)
     none = np.zeros(0, dtype=np.int64)
-    kept = KeptMotions(none, nothing, np.zeros((0, 3), np.int64), none, none, [], np.zeros((0, 0)))
-    block = Block(
+    kept = native.KeptMotions(
+        none, nothing, np.zeros((0, 3), np.int64), none, none, [], np.zeros((0, 0))
+    )
+    block = native.Block(
         times=times,
         drives=drives,
         rows=rows[1:],
@@ -205,14 +205,14 @@ def _steps(
     return native.Steps(parts, block), rows
 
 
-def _nothing_of_line(motion: Motion) -> Shown:
+def _nothing_of_line(motion: Motion) -> native.Shown:
     """Parts of the rows with values of the line."""
     no_dependents = Dependents(NO_LINKS, np.zeros(1, dtype=np.int64))
     ends = np.array([0, 1])
     columns = Columns(ends, ends, *np.zeros((2, 2, 3), dtype=np.int32))
     none = np.zeros(0, dtype=np.int64)
     links = NO_LINKS, NO_LINKS, no_dependents, no_dependents
-    return Shown(motion, none, *links, np.zeros(0), columns)
+    return native.Shown(motion, none, *links, np.zeros(0), columns)
 
 
 def _ended(

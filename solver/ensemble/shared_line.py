@@ -14,6 +14,7 @@ matrices hold without compensations, and the line starts displaced from there.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import starmap
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ from catenary.solver.kernels import native
 from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.partition import distribute
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.switching_links import LinkArrays, LinkTable, switching_links
+from catenary.solver.model.switching_links import LinkTable, switching_links
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.line_at_rest import LineAtRest
@@ -116,26 +117,6 @@ def _displaced(
 N_LANES: int = native.SCENES
 
 
-class LineExtremes(NamedTuple):
-    """Extremes of uplift and dropper force in each lane; see ``kernels/ensemble/scene_passes.hpp``.
-
-    Attributes
-    ----------
-    arms : (n_arms,) unknowns of vertical displacement at steady arms
-    droppers : LinkArrays
-    rest : (n_droppers, N_LANES) their reserves at rest [N]
-    uplift : (n_arms, N_LANES) largest displacement [m]
-    least, largest : (n_droppers, N_LANES) forces of droppers [N]
-    """
-
-    arms: np.ndarray
-    droppers: LinkArrays
-    rest: np.ndarray
-    uplift: np.ndarray
-    least: np.ndarray
-    largest: np.ndarray
-
-
 class Lane:
     """A scene's part of a shared line.
 
@@ -164,7 +145,7 @@ class SharedLine:
     steps_together : whether kernels step it in several scenes; there is nothing else if not
     columns, line : as a ``March`` has them
     lanes : one for each scene
-    extremes : LineExtremes
+    extremes : ``native.LineExtremes``
     native : compiled steps, ``native.Ensemble``
 
     Parameters
@@ -185,7 +166,7 @@ class SharedLine:
             passes is not None
             and not model.loads
             and not model.droppers_bend  # extremes of forces know one slope
-            and all(map(native.are_compiled_for_scenes, passes.rows, passes.columns))
+            and all(starmap(native.are_compiled_for_scenes, passes.parts.layouts))
         )
         if passes is None or not self.steps_together:
             return
@@ -196,17 +177,19 @@ class SharedLine:
             self.comm, model, self._wires, self.line, links[0], range_of_run
         )
         arrays = passes.arrays_in_lanes(N_LANES)
-        motions = [LineState.of(arrays.motion.at(k), self.line.motion.gains) for k in lanes]
+        x, y, z, *same = arrays.motion
+        own = (native.Motion(x[k:], y[k:], z[k:], *same) for k in lanes)
+        motions = [LineState.of(motion, self.line.motion.gains) for motion in own]
         self.lanes = [Lane(*own) for own in zip(lanes, motions, links, strict=True)]
         _, droppers, _ = links[0].shown(DROPPERS)
         n, arms = droppers.law.size, model.dofs(model.mesh.steady_arms).astype(np.int64)
         self._rest = np.zeros((links[0].numbers.size, N_LANES))
         forces = np.zeros((3, n, N_LANES))
-        self.extremes = LineExtremes(arms, droppers, forces[0], np.zeros((arms.size, N_LANES)),
-                                     *forces[1:])  # fmt: skip
+        uplift = np.zeros((arms.size, N_LANES))
+        self.extremes = native.LineExtremes(arms, droppers, forces[0], uplift, *forces[1:])
         followed = passes.tracked(links[0].links, links[0].reserve)
         parts = passes.parts._replace(arrays=arrays)
-        self._passes = native.ScenePasses(passes.rows, passes.columns, parts)
+        self._passes = native.ScenePasses(parts)
         self._passes.track(followed, self._rest, [own.reserve for own in links])
         self.native = native.Ensemble(self._passes, self.extremes)
         for lane in self.lanes:

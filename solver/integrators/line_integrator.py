@@ -18,7 +18,12 @@ from catenary.base.mpi import MPI
 from catenary.base.parallel import total
 from catenary.base.petsc import PETSc
 from catenary.solver.integrators.line_loads import LineLoads
-from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
+from catenary.solver.integrators.line_state import (
+    AlphaSteps,
+    LineState,
+    Newmark,
+    PredictedLineState,
+)
 from catenary.solver.integrators.slow_path import GENERAL, LIBRARY, PARTS, SlowPath
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays, native
@@ -158,7 +163,7 @@ class LineIntegrator(ABC):
         if self.loads is not None:
             self.loads.read(motion)
 
-    def _ahead(self) -> tuple[PredictedLineState, Steps | AlphaSteps] | None:
+    def _ahead(self) -> tuple[PredictedLineState, Newmark | AlphaSteps] | None:
         """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.
 
         None if the method cannot.

@@ -1,7 +1,7 @@
 """Kernels of the time loop, compiled from C++: names and types of the extension."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -20,6 +20,52 @@ class Bound:
     """A kernel with its first arguments, which it keeps alive."""
 
     def __call__(self, *later: Any) -> Any: ...
+
+class _Record(tuple[Any, ...]):
+    """A named tuple of the members of a struct in C++, whose header says what each of them is."""
+
+    def __new__(cls, *values: Any, **named: Any) -> Self: ...
+    def __getattr__(self, name: str) -> Any: ...
+    def _replace(self, **named: Any) -> Self: ...
+    def _asdict(self) -> dict[str, Any]: ...
+
+class Ahead(_Record): ...
+class Alpha(_Record): ...
+class Block(_Record): ...
+class Changes(_Record): ...
+class Changing(_Record): ...
+class Columns(_Record): ...
+class Cuts(_Record): ...
+class Depths(_Record): ...
+class FactorArrays(_Record): ...
+class KeptMotions(_Record): ...
+class LineExtremes(_Record): ...
+class Loads(_Record): ...
+class Memories(_Record): ...
+class MemoryTables(_Record): ...
+class Motion(_Record): ...
+class Newmark(_Record): ...
+class PassArrays(_Record): ...
+class PassParts(_Record): ...
+class PathRoom(_Record): ...
+class PivotRoom(_Record): ...
+class ProductArrays(_Record): ...
+class ReportedForces(_Record): ...
+class Room(_Record): ...
+class Sampled(_Record): ...
+class Sections(_Record): ...
+class Shown(_Record): ...
+class Signs(_Record): ...
+class SmallProblem(_Record): ...
+class StationBlocks(_Record): ...
+class StepLaw(_Record): ...
+class StepParts(_Record): ...
+class System(_Record): ...
+class Tangents(_Record): ...
+class TrackedLinks(_Record): ...
+class Turning(_Record): ...
+class Unknowns(_Record): ...
+class Window(_Record): ...
 
 spline_at: Kernel
 tables_at: Kernel
@@ -129,8 +175,6 @@ evaluate: Kernel
 recall: Kernel
 fourier_forth: Kernel
 
-step_error: Kernel
-accept_step: Kernel
 take_extremes: Kernel
 take_points: Kernel
 
@@ -167,7 +211,6 @@ solve: Kernel
 MOST_TANGENTS: int
 linearise: Kernel
 remember: Kernel
-agrees: Kernel
 
 class Layout:
     """How the unknowns of a station stand in vectors, and which products blocks of such rows or
@@ -228,8 +271,16 @@ class Solves:
     def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
         """Fill ``answer``, which may be ``right``."""
 
-class FreeSteps:
-    """Steps in two passes."""
+class TwoPasses:
+    """Free steps in two passes with the arrays of ``PassParts``, which they keep, read and write in
+    place."""
+
+    def __init__(self, parts: object) -> None: ...
+    def track(self, links: object) -> None:
+        """Look at ``TrackedLinks`` on the way back."""
+
+    def open(self, window: object) -> None:
+        """Take steps of the stations in a ``Window`` only from now on."""
 
     def step(self) -> None:
         """Take a step."""
@@ -237,25 +288,13 @@ class FreeSteps:
     def predict_velocities(self) -> None:
         """Fill in the velocities that others read in products with C, if there are such."""
 
-class TwoPasses(FreeSteps):
-    """Free steps with their arrays, see ``StationPasses``, which they keep, read and write in
-    place."""
-
-    def __init__(
-        self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object
-    ) -> None: ...
-    def track(self, links: object) -> None:
-        """Look at ``TrackedLinks`` on the way back."""
-
-    def open(self, window: object) -> None:
-        """Take steps of the stations in a ``WindowArrays`` only from now on."""
-
 LEAST_STATIONS: int
 
 left_behind: Kernel
 turn_to: Kernel
 show: Kernel
 take_in: Kernel
+keep: Kernel
 
 COUNTS: np.dtype[np.void]
 
@@ -268,10 +307,7 @@ class Taken:
     @property
     def is_full(self) -> bool: ...
 
-class BlockSteps:
-    """Steps of a block, which an ``Ensemble`` takes, too."""
-
-class Steps(BlockSteps):
+class Steps:
     """Steps of the scheme ``one_solve`` on one rank, of ``StepParts`` and a ``Block`` of these."""
 
     def __init__(self, parts: object, block: object) -> None: ...
@@ -284,18 +320,13 @@ class Steps(BlockSteps):
 SCENES: int
 MOST_SCENES: int
 
-class SceneSteps:
-    """Free steps of a line in ``SCENES`` scenes side by side."""
+class ScenePasses:
+    """``TwoPasses`` in ``SCENES`` scenes side by side, with arrays of all of them in ``parts``."""
 
+    def __init__(self, parts: object) -> None: ...
     def step(self) -> None:
         """Take a step in all scenes."""
 
-class ScenePasses(SceneSteps):
-    """``TwoPasses`` in ``SCENES`` scenes, with arrays of all scenes in ``parts``."""
-
-    def __init__(
-        self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object
-    ) -> None: ...
     def track(self, links: object, rest: np.ndarray, reserves: Sequence[np.ndarray]) -> None:
         """Fill ``reserves`` (n,) of links in each lane; at rest ``rest`` (n, SCENES) [N]."""
 
@@ -321,10 +352,12 @@ class Ensemble:
     def at(self, lane: int) -> tuple[int, bool]:
         """Steps that the scene of a lane has taken, and whether its forces were not found then."""
 
-class LaneSteps:
-    """Free steps of tangents side by side, of the stations that move; see
-    ``kernels/tangents/lane_passes.hpp``."""
+class LanePasses:
+    """``TwoPasses`` of tangents side by side, with arrays of all lanes in ``parts``, of the
+    stations that move: ``guard`` outer ones are looked at, or all move from the start on if it is
+    0. See ``kernels/tangents/lane_passes.hpp``."""
 
+    def __init__(self, parts: object, guard: int) -> None: ...
     @property
     def begin(self) -> int:
         """First unknown that moves."""
@@ -332,14 +365,6 @@ class LaneSteps:
     @property
     def end(self) -> int:
         """The unknown after the last that moves."""
-
-class LanePasses(LaneSteps):
-    """``LaneSteps`` with arrays of all lanes in ``parts``, which they keep, read and write in
-    place; they look at ``guard`` outer stations, or move all from the start on if it is 0."""
-
-    def __init__(
-        self, rows: Sequence[Layout], factors: Sequence[Layout], parts: object, guard: int
-    ) -> None: ...
 
 class TangentSteps:
     """``Steps`` with derivatives by parameters beside them, of ``Tangents``."""

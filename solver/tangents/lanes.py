@@ -120,7 +120,7 @@ def _sizes(line: LineIntegrator) -> list[int]:
         for size in (native.SCENES, native.MOST_SCENES)
         if all(
             native.are_compiled_for_scenes(rows, factors, size)
-            for rows, factors in zip(passes.rows, passes.columns, strict=True)
+            for rows, factors in passes.parts.layouts
         )
     ]
 
@@ -145,7 +145,7 @@ def _lanes(
     # Loads in time move the line everywhere, and at once.
     waits = not passes.parts.arrays.loads.size and not any(start.any() for start in starts)
     guard = line.windows.n_stations if waits else 0
-    stepped = native.LanePasses(passes.rows, passes.columns, parts, guard)
+    stepped = native.LanePasses(parts, guard)
     return TangentLanes(stepped, arrays.motion, arrays.loads, rows)
 
 

@@ -25,7 +25,7 @@ from catenary.solver.statics.changed_line.after_incidents import divided_by_mass
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.lanes import TangentLanes, groups_of, lanes_of
 from catenary.solver.tangents.set_up import Change, set_up_of
-from catenary.solver.time_loop.compiled_steps import Block, CompiledSteps, StepParts
+from catenary.solver.time_loop.compiled_steps import CompiledSteps
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.prepared_line import make_room
 from catenary.solver.time_loop.views.step_views import Showing
@@ -163,7 +163,7 @@ class TangentSteps(CompiledSteps):
             "the forces of a step are not found by the compiled loop, which its derivatives need"
         )
 
-    def _made(self, parts: StepParts, block: Block) -> Any:
+    def _made(self, parts: native.StepParts, block: native.Block) -> Any:
         return native.TangentSteps(parts, block, self._tangents)
 
 

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from repeating_line import layout, line
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.solver.integrators.line_state import PredictedLineState, Steps
+from catenary.solver.integrators.line_state import Newmark, PredictedLineState
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays
@@ -28,7 +28,7 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 N_STATIONS, PERIOD = 1126, 45
-STEPS = Steps(1e-3, 2.5e-7, 5e-4, 0.003, 2.5e-7, 5e-4, 0.0)
+STEPS = Newmark(1e-3, 2.5e-7, 5e-4, 0.003, 2.5e-7, 5e-4, 0.0)
 ROUNDS, CALLS = 300, 20
 FLOOR = "floor"
 # Planes of a station, and the most that a step may take in terms of the floor: 1.3 times what it

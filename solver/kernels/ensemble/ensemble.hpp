@@ -7,21 +7,18 @@ namespace catenary {
 
 /// A scene on its way: its steps, the next of its block and the end of it.
 struct March {
-    Steps* steps = nullptr;  ///< none where no scene is
+    std::shared_ptr<Steps> steps;  ///< none where no scene is
     int64_t next = 0, end = 0;
     bool is_left = false;  ///< whether the forces of a step were not found; it stays then
 };
 
 class Ensemble {
   public:
-    /// `passes` are kept by reference.
-    Ensemble(ScenePasses& passes, LineExtremes extremes)
-        : passes_(passes), extremes_(std::move(extremes)) {
-        passes_.make_room(extremes_.droppers.law.size());
-    }
+    Ensemble(std::shared_ptr<ScenePasses> passes, LineExtremes extremes);
+    virtual ~Ensemble() = default;
 
     /// Begin a scene in a lane, whose line is at rest, with n steps of its block.
-    void begin(int lane, Steps& steps, int64_t n);
+    void begin(int lane, std::shared_ptr<Steps> steps, int64_t n);
     /// Take steps until a scene is at its end, or left, or until so many were taken.
     void take(int64_t most);
     const March& at(int lane) const { return marches_.at(lane); }
@@ -31,7 +28,7 @@ class Ensemble {
         return march.steps && !march.is_left && march.next < march.end;
     }
 
-    ScenePasses& passes_;
+    std::shared_ptr<ScenePasses> passes_;
     LineExtremes extremes_;
     std::array<March, kScenes> marches_{};
 };

@@ -131,6 +131,7 @@ void ScenePasses::take(const LineExtremes& extremes, const std::array<bool, kSce
 }
 
 void ScenePasses::rest(int scene) const {
+    if (scene < 0 || scene >= kScenes) throw std::out_of_range("there is no such scene");
     const PassArrays& arrays = parts_.arrays;
     auto clear = [scene](std::span<double> numbers) {
         for (size_t at = scene; at < numbers.size(); at += kScenes) numbers[at] = 0.0;

@@ -9,8 +9,6 @@
 
 #include "base/arrays.hpp"
 #include "base/curves.hpp"
-#include "base/record.hpp"
-#include "contact/across.hpp"
 #include "contact/touch.hpp"
 #include "heads/regulation.hpp"
 

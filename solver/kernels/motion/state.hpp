@@ -1,7 +1,6 @@
 #pragma once
 // The motion of a rank's part of a line, as it is read at single unknowns.
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 

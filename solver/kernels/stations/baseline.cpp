@@ -1,4 +1,3 @@
-#include "stations/before_target.hpp"
 #include "stations/targets.hpp"
 #define CATENARY_TARGET baseline
 #ifdef CATENARY_X86_TARGETS

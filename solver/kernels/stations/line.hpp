@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "base/record.hpp"
+#include "base/arrays.hpp"
 #include "stations/layout.hpp"
 
 namespace catenary {

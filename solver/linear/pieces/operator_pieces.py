@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import RunBroken
+from catenary.solver.kernels import native
 from catenary.solver.linear.petsc_solvers import DIRECT, wants_own_solver
 from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots
 from catenary.solver.linear.station_factors import (
     MIDDLES,
     FoundFactors,
     StationFactors,
-    Turning,
     besides_of,
     completed,
     layout_of_factors,
@@ -69,7 +69,7 @@ class FactorPieces:
         besides = np.zeros(n, dtype=np.int32), self._besides.numbers
         kinds = np.zeros(n, dtype=np.int32)
         here = np.zeros(-(-n // MIDDLES), dtype=np.int32)
-        self._turning = Turning(kinds.copy(), kinds.copy(), here)
+        self._turning = native.Turning(kinds.copy(), kinds.copy(), here)
         self.factors = StationFactors(
             layout, stations, kinds, self._blocks.numbers, 0, n, 0, besides, self._turning
         )

@@ -7,28 +7,15 @@ column of zeros.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
+from catenary.solver.kernels import native
 from catenary.solver.model.unknown_registry import Unknowns
 
-
-class Places(NamedTuple):
-    """Places of stations in vectors, for kernels: arrays without entries if all are alike.
-
-    Attributes
-    ----------
-    starts : (n,) first unknown of each
-    station_type : (n,) of each
-    """
-
-    starts: np.ndarray
-    station_type: np.ndarray
-
-
-ALIKE = Places(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
+# Of stations that are all alike.
+_ALIKE = native.Sections(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
 
 
 @dataclass(frozen=True)
@@ -77,11 +64,13 @@ class Sections:
         starts = self.starts[first : last + 1] - self.starts[first]
         return Sections(starts, self.station_type[first:last], self.station_types, self.width)
 
-    def places(self) -> Places:
+    def places(self) -> native.Sections:
         """Places of the stations as kernels read them."""
         if not self.varies:
-            return ALIKE
-        return Places(self.starts[:-1].astype(np.int64), self.station_type.astype(np.uint8))
+            return _ALIKE
+        return native.Sections(
+            self.starts[:-1].astype(np.int64), self.station_type.astype(np.uint8)
+        )
 
     def padded(self) -> Sections:
         """Return these sections with a further station of all places at both ends."""

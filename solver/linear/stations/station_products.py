@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from scipy import sparse
 
 from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.linear.stations.sections import Places, Sections
+from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
 from catenary.solver.linear.stations.station_rows import StationRows, rows_of
 from catenary.solver.model.alike import kinds_of
@@ -94,15 +94,6 @@ def kinds_by_type(
     return begins, aligned_arrays.copy(np.concatenate(numbers)), n_kinds, count
 
 
-class ProductArrays(NamedTuple):
-    """Arrays of a ``StationProduct`` as kernels read them."""
-
-    kinds: np.ndarray
-    blocks: np.ndarray
-    first: int
-    sections: Places
-
-
 class StationProduct:
     """Products with rows of K, and C if the layout is damped. Not collective.
 
@@ -116,7 +107,7 @@ class StationProduct:
     first : station in the factor of the first row; the factor has one before and one after all
         rows, which is zero where the line ends
     n_kinds : how many rows are different
-    arrays : ProductArrays
+    arrays : ``native.ProductArrays``
     """
 
     def __init__(
@@ -130,7 +121,7 @@ class StationProduct:
     ) -> None:
         self.layout, self.stations, self.kinds = layout, stations, kinds
         self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
-        self.arrays = ProductArrays(kinds, blocks, first, stations.places())
+        self.arrays = native.ProductArrays(kinds, blocks, first, stations.places())
 
     @cached_property
     def _products(self) -> native.Products:

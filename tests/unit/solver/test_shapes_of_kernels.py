@@ -52,7 +52,7 @@ CALLS = {
     "move_bodies": (np.zeros((N + 1, 3)), np.ones((N + 1, 4)), np.zeros(6 * N)),
     "add_gyroscopic_moments": (np.zeros(6 * N), np.zeros((N, 3)), np.zeros((N + 1, 3))),
     "find_solution": system(N),
-    "solve": (small_problem(),),
+    "solve": (small_problem(), None),
 }
 
 

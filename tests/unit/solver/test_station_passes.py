@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from repeating_line import layout, line, widths_of
 
-from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
+from catenary.solver.integrators.line_state import LineState, Newmark, PredictedLineState
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
 from catenary.solver.linear.station_factors import station_factors
@@ -15,7 +15,7 @@ from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import RESERVE, LinkArrays
 
 RNG = np.random.default_rng(11)
-STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+STEPS = Newmark(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
 LAWS = np.zeros(2000, dtype=RESERVE)
 for name in ("rest", "stiffness", "damping"):
     LAWS[name] = RNG.standard_normal(LAWS.size)
