@@ -30,7 +30,7 @@ import numpy as np
 
 from catenary.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import Affine, Coupled, LineResponse, affine
+from catenary.solver.contact.line_response import LineResponse, affine
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 
@@ -144,13 +144,13 @@ class InnerProblem:
     unknowns : room for the problem, another one when more links need some
     """
 
-    def __init__(self, law: LawInSteps, coupled: Coupled) -> None:
+    def __init__(self, law: LawInSteps, coupled: native.Coupled) -> None:
         self.law = law
         self.gap = Gap(law.n)
         self.coupled = coupled
         self.pivoted = False
         self._room = -1
-        self._bound_to: tuple[Affine | None, LineResponse | None]
+        self._bound_to: tuple[native.Affine | None, LineResponse | None]
         self.make_room(_FIRST_ROOM)
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
@@ -180,7 +180,8 @@ class InnerProblem:
                 f"the contact law finds no force within {native.MOST_TANGENTS} tangents; take a "
                 "smaller numerics.dt_s"
             )
-        (depth, rate), solution = gap.found, self.unknowns.solution
+        depth, rate = gap.found
+        solution = self.unknowns.solution
         forces = solution[:n], solution[n:size]
         return InnerSolution(*forces, depth, rate, rounds, self.pivoted, complete)
 
@@ -215,7 +216,7 @@ class InnerProblem:
         ``line``; ``slack`` (m,) are the compensations of the links with a row [N]."""
         return not native.leaves_out(force, slack, line.rows, line.bounds, self.coupled)
 
-    def problem(self, heads: Affine, line: LineResponse) -> native.SmallProblem:
+    def problem(self, heads: native.Affine, line: LineResponse) -> native.SmallProblem:
         """Small problem as kernels solve it; ``unknowns`` are others when more links need room."""
         return native.SmallProblem(
             heads=heads,

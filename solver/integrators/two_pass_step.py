@@ -33,7 +33,7 @@ class StationPasses:
 
     Attributes
     ----------
-    native : compiled step, for loops that take steps themselves
+    native : compiled steps
     are_compiled : whether kernels were compiled for what its stations join
     parts : ``native.PassParts``
     factors : as given
@@ -124,17 +124,6 @@ class StationPasses:
         ``track_links``."""
         self.native.open(window)
         self.native.track(native.TrackedLinks(links, reserve, window.ranges, window.low.size))
-
-    def predict_velocities(self) -> None:
-        """Compute the rank's own predicted velocities, which a product with C on other ranks reads.
-
-        A step computes them as well, but after the other ranks have read.
-        """
-        self.native.predict_velocities()
-
-    def step(self) -> None:
-        """Find the accelerations and what the next step starts from."""
-        self.native.step()
 
 
 def changes_of(

@@ -13,14 +13,13 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from catenary.base.petsc import PETSc
 from catenary.solver.kernels import native
 from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_products import kinds_by_type, of_pairs
-from catenary.solver.linear.stations.station_rows import StationRows, rows_of
+from catenary.solver.linear.stations.station_rows import StationRows
 
 # Distance in stations between the places at which elimination may end, if there are several.
 MIDDLES = native.MIDDLES
@@ -93,28 +92,23 @@ class StationFactors:
 
 
 def station_factors(
-    matrix: sparse.bsr_matrix | StationRows,
+    rows: StationRows,
     layout: Layout,
+    stations: Sections,
     low: int = 0,
     high: int | None = None,
-    stations: Sections | None = None,
     turns: bool = False,
 ) -> StationFactors | None:
-    """Factors of a positive definite matrix in sorted blocks, or of its rows by stations.
+    """Factors of a positive definite matrix, given by its rows by stations.
 
     It is eliminated towards the middle of the stations from ``low`` to ``high``, all by default.
     ``stations`` may be of several station types. The middle may be moved if it ``turns``.
 
-    None if it is not block tridiagonal by stations, or if a station is joined to unknowns of one
-    beside it that it lacks itself. A matrix that is not positive definite gives
-    wrong answers or NaN.
+    None if a station is joined to unknowns of one beside it that it lacks itself. A matrix that is
+    not positive definite gives wrong answers or NaN.
     """
-    rows = rows_of(matrix, 0, stations)
-    if rows is None:
-        return None
     n = rows.kinds.size
     high = n if high is None else high
-    stations = Sections.alike(n, layout.pitch) if stations is None else stations
     rows = completed(rows, stations)
     layout = layout_of_factors(layout, rows.blocks)
     besides = besides_of(layout, stations, rows)

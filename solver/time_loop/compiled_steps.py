@@ -81,14 +81,10 @@ class CompiledSteps:
             places=places,
             kept_places=np.zeros((self.most_motions, sum(array.size for array in places))),
         )
-        n, passes = pantographs.n_contacts, interaction.line.passes
-        assert passes is not None
-        self._free = passes.native
+        assert interaction.line.passes is not None
+        self._free = interaction.line.passes.native
         loads = interaction.line.loads
         self._loads = loads if loads is not None and loads.changes else None
-        self._law = scheme.coupling.law.in_loop()
-        self._strips = np.zeros(2 * n * (1 + n))
-        self._at_contacts = affine(self._strips, n)
         self._drives = np.zeros((self.most, pantographs.n, drive_width(pantographs.most_contacts)))
         self._counts = np.zeros(1, dtype=native.COUNTS)
         self._made_of: tuple[Any, Any] = None, None
@@ -227,8 +223,15 @@ class CompiledSteps:
         # A step may exchange these arrays for larger ones.
         if self._made_of[0] is not share or self._made_of[1] is not unknowns:
             self._made_of = share, unknowns
-            problem = coupling.inner.problem(self._at_contacts, share)
-            moved = self._moved
+            moved, showing = self._moved, self._showing
+            parts = step_parts(
+                self.scheme,
+                self._heads,
+                free=self._free,
+                loads=[] if self._loads is None else [self._loads.arguments],
+                shown=showing.shown,
+                channels=showing.layout.copied,
+            )
             block = native.Block(
                 times=self.times,
                 drives=self._drives,
@@ -238,32 +241,46 @@ class CompiledSteps:
                 kept=self._kept,
                 counts=self._counts,
             )
-            self._steps = self._made(self._parts(problem), block)
+            self._steps = self._made(parts, block)
         return self._steps
 
     def _made(self, parts: native.StepParts, block: native.Block) -> Any:
         """Native steps of these parts."""
         return native.Steps(parts, block)
 
-    def _parts(self, problem: native.SmallProblem) -> native.StepParts:
-        pantographs, interaction = self.scheme.pantographs, self.scheme.interaction
-        return native.StepParts(
-            speed=float(pantographs.speed),
-            train=pantographs.places_along,
-            contacts=interaction.contacts,
-            free=self._free,
-            loads=[] if self._loads is None else [self._loads.arguments],
-            heads=self._heads,
-            strips=self._strips,
-            problem=problem,
-            law=self._law,
-            lateral_place=pantographs.lateral_place,
-            switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
-            train_outputs=pantographs,
-            outputs=pantographs.outputs,
-            shown=self._showing.shown,
-            channels=self._showing.layout.copied,
-        )
+
+def step_parts(scheme: OneSolve, heads: Sequence[native.Head], **of_line: Any) -> native.StepParts:
+    """Arguments of native steps on the arrays that a scheme has now. Not collective.
+
+    Parameters
+    ----------
+    scheme : OneSolve
+        Scheme whose steps are taken.
+    heads : sequence of native.Head
+        Its pantographs as kernels step them.
+    **of_line
+        What the line adds: ``free`` steps, None where others take these, ``loads``, ``shown`` and
+        ``channels``.
+    """
+    pantographs, coupling = scheme.pantographs, scheme.coupling
+    assert isinstance(coupling, Implicit)
+    n = pantographs.n_contacts
+    strips = np.zeros(2 * n * (1 + n))
+    problem = coupling.inner.problem(affine(strips, n), scheme.share)
+    return native.StepParts(
+        speed=float(pantographs.speed),
+        train=pantographs.places_along,
+        contacts=scheme.interaction.contacts,
+        heads=heads,
+        strips=strips,
+        problem=problem,
+        law=coupling.law.in_loop(),
+        lateral_place=pantographs.lateral_place,
+        switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
+        train_outputs=pantographs,
+        outputs=pantographs.outputs,
+        **of_line,
+    )
 
 
 def compiled_steps(

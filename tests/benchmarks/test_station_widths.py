@@ -14,15 +14,13 @@ import numpy as np
 import pytest
 from floor import LIBRARIES
 from mpi4py import MPI
-from repeating_line import layout, line
+from repeating_line import layout, line, station_factors, station_product
 from scenes import load_scene, mesh_of, problem_of
 
 from catenary.solver.integrators.line_state import Newmark, PredictedLineState
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays
-from catenary.solver.linear.station_factors import station_factors
-from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.form_finding.equilibrium import find_form

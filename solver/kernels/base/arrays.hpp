@@ -6,6 +6,7 @@
 #include <span>
 #include <stdexcept>
 #include <tuple>
+#include <type_traits>
 
 /// Names the members of a record, last in it. Python has a named tuple of these.
 #define CATENARY_RECORD(...)                              \
@@ -25,6 +26,11 @@ struct Array2 {
     T* data = nullptr;
     int64_t rows = 0, columns = 0;
 
+    operator Array2<const T>() const
+        requires(!std::is_const_v<T>)
+    {
+        return {data, rows, columns};
+    }
     std::span<T> operator[](int64_t row) const { return all().subspan(row * columns, columns); }
     T& operator()(int64_t row, int64_t column) const { return (*this)[row][column]; }
     std::span<T> all() const { return {data, static_cast<size_t>(rows * columns)}; }

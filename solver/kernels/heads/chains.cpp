@@ -83,7 +83,7 @@ void SprungHead::finish(const Drive& drive) {
         after[n + i] = velocity_[i] + newmark().velocity * acceleration;
         after[2 * n + i] = acceleration;
     }
-    respond({matrix.data, n, n});
+    respond(matrix);
 }
 
 void SprungHead::remember(std::span<const double> contact_force) {

@@ -46,8 +46,10 @@ bool find_zero_of(const py::function& of, std::span<double> z, double width, dou
 }  // namespace
 
 void offer_contact(py::module_& module) {
-    offer_records<System, Signs, PathRoom, PivotRoom, Room, Unknowns, Depths, SmallProblem,
-                  Tangents, ReportedForces, StepLaw>(module);
+    offer_records<Wires, Answers, Gains, Followed, ContactWork, Sideways, Across, Contacts, Leads,
+                  TrainPlaces, StripEnds, Affine, Bounds, Share>(module);
+    offer_records<Tangents, ReportedForces, StepLaw, Coupled, System, Signs, PathRoom, PivotRoom,
+                  Room, Unknowns, Depths, SmallProblem>(module);
     CATENARY_OFFER_TYPE(module, "NODE", Node, x, y, rest, at, begin, width, local, owned, joined);
     CATENARY_OFFER_TYPE(module, "SAMPLE", Sample, x, height, slope);
     CATENARY_OFFER_TYPE(module, "TOUCH", Touch, first, end, half_length, present, x, element, local,

@@ -46,7 +46,6 @@ void offer_line(py::module_& module) {
     offer(module, "energy_of_switching", energy_of_switching, "*, n=n, n=n");
     module.attr("LEAST_STATIONS") = kLeastStations;
     offer(module, "turn_to", turn_to, "");
-    offer(module, "take_in", take_in, "2, 2..");
     offer(module, "keep", keep, "m=m, *, *, *");
     offer(module, "show", show, "a=a d=d, a, d");
 

@@ -7,3 +7,14 @@
 #include "stations/scene_blocks.hpp"
 #endif
 #include "stations/target.hpp"
+
+#ifdef CATENARY_X86_TARGETS
+namespace catenary::baseline {
+
+/// None: vectors are too short for it.
+std::unique_ptr<Kernels> make_for_scenes(const Layout&, const Layout&, int) {
+    return nullptr;
+}
+
+}  // namespace catenary::baseline
+#endif
