@@ -236,18 +236,13 @@ def _same_links(one: LinkTable, other: LinkTable) -> bool:
     """Whether links are the same but for their reserves at rest."""
     if one.arrays.law.size != other.arrays.law.size:
         return False
-    return (
-        np.array_equal(one.arrays.unknowns, other.arrays.unknowns)
-        and np.array_equal(one.arrays.weights, other.arrays.weights)
-        and all(
-            np.array_equal(one.arrays.law[name], other.arrays.law[name])
-            for name in one.arrays.law.dtype.names or ()
-            if name != "rest"
-        )
-        and np.array_equal(one.broken, other.broken)
-        and np.array_equal(one.leader, other.leader)
-        and np.array_equal(one.bent, other.bent)
+    law = other.arrays.law.copy()
+    law["rest"] = one.arrays.law["rest"]
+    mine, others = (
+        (links.arrays.unknowns, links.arrays.weights, links.broken, links.leader, links.bent)
+        for links in (one, other)
     )
+    return np.array_equal(one.arrays.law, law) and all(map(np.array_equal, mine, others))
 
 
 def why_alone(problem: Problem) -> str:

@@ -49,7 +49,7 @@ class EndMemories:
             for load in loads
         ]
         mine = [load for load, own in zip(loads, owns, strict=True) if own]
-        self._all, self._mine, self._owner = list(loads), mine, domain.first
+        self._all, self._mine = list(loads), mine
         self.places = np.concatenate(
             [np.zeros(0, np.int64), *(load.unknowns - domain.low for load in mine)]
         )

@@ -38,7 +38,6 @@ class StationPasses:
     parts : ``native.PassParts``
     factors : as given
     known : accelerations that the motion keeps besides x, y and z, or none
-    by_mass : whether right-hand sides are products with M, where these are shorter than with K
 
     Parameters
     ----------
@@ -60,7 +59,7 @@ class StationPasses:
     ) -> None:
         product, factors, read, velocity, answer, by_mass = parts
         _, _, low, high, _ = factors.ends.tolist()
-        self.by_mass, self.factors = by_mass != 0.0, factors
+        self.factors = factors
         changes = changes_of(motion, steps, by_mass)
         known = predicted = np.zeros(0)
         if isinstance(motion, AlphaAhead):
