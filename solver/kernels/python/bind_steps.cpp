@@ -12,6 +12,7 @@ namespace {
 void write(const Steps& steps, const std::string& path, const py::object& ahead) {
     Kept kept;
     const StepParts& parts = steps.parts();
+    if (!parts.free) throw py::value_error("these steps are taken by an ensemble");
     const TwoPasses& free = *parts.free;
     PreparedLine line{parts, free.parts(), free.tracked(), free.window(), {}, {}};
     for (const Head* head : parts.heads) line.heads.push_back(parts_of(*head));
