@@ -39,14 +39,6 @@ def surface_samples(model: Model) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(parts), np.stack([ends[:-1], ends[1:]], axis=1)
 
 
-class WireShapes(NamedTuple):
-    """Shapes of contact wires: ``nodes`` (n,) of ``NODE`` wire by wire, and samples of their
-    running ``surface`` (m,) of ``SAMPLE``, ascending in each wire, none of a wire that has none."""
-
-    nodes: np.ndarray
-    surface: np.ndarray
-
-
 class Candidates(NamedTuple):
     """Pairs of strip and contact wire, strip by strip.
 
@@ -71,7 +63,7 @@ class ContactWires:
     ranges : (n_wires, 2) first node of each wire, and the one after its last
     mesh_nodes : (n_nodes,) their numbers in the mesh
     nodes : (n_nodes,) records of ``NODE``, of no columns until a ``ForcesOnLine`` has some
-    shapes : WireShapes, these nodes and the wires' running surfaces
+    shapes : ``native.Wires``, these nodes and the wires' running surfaces
     """
 
     def __init__(self, model: Model, form: Equilibrium, ownership: Ownership) -> None:
@@ -98,7 +90,7 @@ class ContactWires:
         self.nodes["owned"] = mine
         self.nodes["rest"] = np.stack([form.height[nodes], form.slope[nodes]], axis=1)
         surface, self._samples = surface_samples(model)
-        self.shapes = WireShapes(self.nodes, surface)
+        self.shapes = native.Wires(self.nodes, surface)
 
     @property
     def dofs(self) -> np.ndarray:

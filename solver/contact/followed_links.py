@@ -4,30 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from catenary.solver.contact.line_response import Coupled
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import ShortColumns
 from catenary.solver.model.switching_links import Dependents, LinkArrays, LinkTable
-
-
-class Followed(NamedTuple):
-    """Links that a rank follows, in the order along the track, as kernels take them: their
-    ``numbers`` (n,) in the line, ``links`` (``LinkArrays``) and ``reserve`` (n,) [N], as a free
-    step leaves it; which of them may switch, ``moving`` (2,); their ``dependents``, of numbers
-    ``dependent_numbers`` (m,)."""
-
-    numbers: np.ndarray
-    links: LinkArrays
-    reserve: np.ndarray
-    moving: np.ndarray
-    dependents: Dependents
-    dependent_numbers: np.ndarray
 
 
 class FollowedLinks:
@@ -79,10 +64,10 @@ class FollowedLinks:
         )
 
     @property
-    def followed(self) -> Followed:
+    def followed(self) -> native.Followed:
         """Followed links as kernels take them."""
         links = self.numbers, self.links, self.reserve, self.moving
-        return Followed(*links, self.dependents, self.dependent_numbers)
+        return native.Followed(*links, self.dependents, self.dependent_numbers)
 
     def shown(self, component: str) -> tuple[np.ndarray, LinkArrays, Dependents]:
         """Numbers among those of its component, and arrays, of all links that this rank owns,
@@ -149,10 +134,10 @@ class FollowedLinks:
         return found
 
 
-def no_links() -> Coupled:
+def no_links() -> native.Coupled:
     """A line without links that switch."""
     none = np.zeros(0)
-    return Coupled(np.zeros((0, 1)), none, none > 0.0, np.zeros(0, dtype=np.int64), none)
+    return native.Coupled(np.zeros((0, 1)), none, none > 0.0, np.zeros(0, dtype=np.int64), none)
 
 
 class LinkCoupling:
@@ -164,7 +149,7 @@ class LinkCoupling:
     Attributes
     ----------
     columns : of A^-1 for unit compensations of all links
-    coupled : Coupled, whose band are the G_de; without any link on other ranks
+    coupled : ``native.Coupled``, whose band are the G_de; without any link on other ranks
     """
 
     def __init__(self, comm: Any, followed: FollowedLinks, line: LineIntegrator) -> None:
@@ -186,7 +171,7 @@ class LinkCoupling:
         if band is not None:
             released, slackens = table.arrays.law["released"].copy(), table.slackens
             behind = np.arange(law.size) - table.leader
-            self.coupled = Coupled(band, released, slackens, behind, np.zeros(law.size))
+            self.coupled = native.Coupled(band, released, slackens, behind, np.zeros(law.size))
 
     def _band_of(self, columns: ShortColumns) -> np.ndarray:
         """The array of the G_de, zero until their columns are there."""

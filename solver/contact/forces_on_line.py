@@ -9,15 +9,7 @@ import numpy as np
 
 from catenary.base.mpi import MPI
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.contacts import (
-    Across,
-    Answers,
-    Contacts,
-    ContactWork,
-    Gains,
-    Sideways,
-    no_sideways,
-)
+from catenary.solver.contact.contacts import no_sideways
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.integrators.line_integrator import LineIntegrator
@@ -32,14 +24,14 @@ from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 def sideways_of(
     model: Model, form: Equilibrium, wires: ContactWires, ownership: Ownership
-) -> Sideways:
+) -> native.Sideways:
     """Lateral data of a line with lateral motion, which is at rest in ``form``."""
     dofs = np.stack([model.dofs(wires.mesh_nodes, name) for name in ("v", "theta_z")], axis=1)
     mine = ownership.owned(dofs)
     local = np.where(mine, dofs - ownership.first, 0).astype(np.int64)
     assert form.lateral is not None
     rest = np.stack([form.lateral.y, form.lateral.slope], axis=1)[wires.mesh_nodes]
-    return Sideways(local, mine, rest)
+    return native.Sideways(local, mine, rest)
 
 
 class WiresAcross:
@@ -50,19 +42,19 @@ class WiresAcross:
 
     Parameters
     ----------
-    across : (3, n) what ``Across`` is on rank 0, row by row; overwritten
+    across : (3, n) what ``native.Across`` is on rank 0, row by row; overwritten
 
     Attributes
     ----------
-    share : Across of this rank
+    share : ``native.Across`` of this rank
     """
 
     def __init__(self, comm: Any, across: np.ndarray) -> None:
         self._comm, self._across = comm, across
         self._share = across if comm.size == 1 else np.zeros(across.shape)
-        self.share = Across(*self._share)
+        self.share = native.Across(*self._share)
 
-    def find(self, contacts: Contacts) -> None:
+    def find(self, contacts: native.Contacts) -> None:
         """Fill in where the contacts, which are located, meet the wires. Collective."""
         native.find_across(contacts)
         if self._comm.size > 1:
@@ -149,7 +141,7 @@ class ForcesOnLine:
         train_speed: float,
         uses_rate: bool,
         across: np.ndarray,
-        work: ContactWork,
+        work: native.ContactWork,
         motion: LineState | None = None,
     ) -> None:
         motion = motion or line.motion
@@ -163,13 +155,17 @@ class ForcesOnLine:
         sideways = no_sideways()
         if self._moves_across:
             sideways = sideways_of(model, form, wires, line.ownership)
-        self.contacts = Contacts(
+        self.contacts = native.Contacts(
             x=candidates.place,
             touches=wires.on_wires(candidates.wire, candidates.half_length),
             wires=wires.shapes,
             columns=columns.of_nodes,
-            answers=Answers(np.zeros((n, n_local)), np.zeros((n, n_local if uses_rate else 0))),
-            gains=Gains(train_speed, line.position_factor, line.velocity_factor, columns.reach),
+            answers=native.Answers(
+                np.zeros((n, n_local)), np.zeros((n, n_local if uses_rate else 0))
+            ),
+            gains=native.Gains(
+                train_speed, line.position_factor, line.velocity_factor, columns.reach
+            ),
             motion=motion.read,
             motion_gains=motion.gains,
             followed=self.links.followed,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.mbs.interface import HeadState
-from catenary.solver.contact.line_response import Affine, affine
+from catenary.solver.contact.line_response import affine
+from catenary.solver.kernels import native
 
 
 class Heads(HeadState):
@@ -16,7 +17,7 @@ class Heads(HeadState):
     it. ``affine`` are the same numbers under the names that they have for line and gap.
     """
 
-    affine: Affine
+    affine: native.Affine
 
     def __init__(self, n: int) -> None:
         super().__init__(n)

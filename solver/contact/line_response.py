@@ -9,24 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.kernels.native import FLAGS
+from catenary.solver.kernels.native import FLAGS, Affine, Bounds, Share
 
 # Numbers that add up over ranks besides answers.
 N_FLAGS = FLAGS.itemsize // 8
-
-
-class Affine(NamedTuple):
-    """Heights and their rates at n contacts as affine functions of the contact forces.
-
-    ``place`` (n,) [m] and ``rate`` (n,) [m/s] without forces, ``by_force`` (n, n) [m/N] and
-    ``rate_by_force`` (n, n) [m/(N s)]: what forces add to those of a line, and take off those of
-    heads and off depths.
-    """
-
-    place: np.ndarray
-    rate: np.ndarray
-    by_force: np.ndarray
-    rate_by_force: np.ndarray
 
 
 def affine(numbers: np.ndarray, n: int) -> Affine:
@@ -60,52 +46,6 @@ def rows_of(numbers: np.ndarray, n: int) -> Rows:
     """Views of ``numbers`` (capacity, 2 + 3 n) for n contacts."""
     couplings = (numbers[:, 2 + k * n : 2 + (k + 1) * n] for k in range(3))
     return Rows(numbers, numbers[:, 0], numbers[:, 1], *couplings)
-
-
-class Bounds(NamedTuple):
-    """Bounds of the forces within which every link that switches has a row.
-
-    Attributes
-    ----------
-    push, pull : (n,) largest force that each contact exerts upward and downward [N]; ``pull`` is 0
-        for a contact that only pushes
-    loss : (1,) largest decrease of a reserve by the compensations of other links [N]
-    """
-
-    push: np.ndarray
-    pull: np.ndarray
-    loss: np.ndarray
-
-
-class Coupled(NamedTuple):
-    """Coupling of all links of the line in the small problem, by their numbers.
-
-    Attributes
-    ----------
-    band : (n_links, 2 half + 1); ``band[e, d - e + half]`` is the decrease of the reserve of link d
-        by a unit compensation of link e [-]
-    released : (n_links,) compensation of a link over its negative reserve [-]
-    slackens : (n_links,) whether the link slackens, as opposed to a stop that closes
-    behind : (n_links,) number of a dependent less that of its leader, 0 for other links
-    drop : (n_links,) work space of kernels, zero before and after each use
-    """
-
-    band: np.ndarray
-    released: np.ndarray
-    slackens: np.ndarray
-    behind: np.ndarray
-    drop: np.ndarray
-
-
-class Share(NamedTuple):
-    """A response as kernels take it: ``flags`` (1,) of ``FLAGS``, ``present`` (n,), 1 for a contact
-    whose wire is on its strip and else 0, ``line`` and ``rows``, and the ``bounds`` of these."""
-
-    flags: np.ndarray
-    present: np.ndarray
-    line: Affine
-    rows: Rows
-    bounds: Bounds
 
 
 class LineResponse:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -37,24 +37,7 @@ if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph
 
 
-class Leads(NamedTuple):
-    """Advance of contacts before the middle of their raked strips, for kernels.
-
-    Attributes
-    ----------
-    contact : (m,) int, numbers of the contacts of raked strips, none for a train without them
-    first : (m + 1,) int, where the points of each begin
-    middle : (k,) places of the strip's middle along the track [m], ascending for each contact
-    lead : (k,) how far the contact is ahead of it [m], straight in between
-    """
-
-    contact: np.ndarray
-    first: np.ndarray
-    middle: np.ndarray
-    lead: np.ndarray
-
-
-def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> Leads:
+def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> native.Leads:
     """The leads of contacts with wires at rest. Not collective.
 
     A strip at the angle r to the cross-section meets the wire y(x) where x = middle + tan(r) y, the
@@ -77,7 +60,7 @@ def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> Leads:
         middles.append(middle)
         leads.append(math.tan(rake[number]) * y)
         first.append(first[-1] + middle.size)
-    return Leads(contact, np.array(first), np.concatenate(middles), np.concatenate(leads))
+    return native.Leads(contact, np.array(first), np.concatenate(middles), np.concatenate(leads))
 
 
 def _crossing(wires: ContactWires, wire: int, rake: float) -> tuple[np.ndarray, np.ndarray]:
@@ -87,23 +70,6 @@ def _crossing(wires: ContactWires, wire: int, rake: float) -> tuple[np.ndarray, 
     middle = x - math.tan(rake) * y
     ascends = np.append(True, np.diff(np.maximum.accumulate(middle)) > 0.0)
     return middle[ascends], y[ascends]
-
-
-class StripEnds(NamedTuple):
-    """Contacts of each strip, and strips of each pantograph: numbers of the first ones, and of
-    all; ``of_strip`` (n_strips + 1,), ``of_pantograph`` (n_pantographs + 1,)."""
-
-    of_strip: np.ndarray
-    of_pantograph: np.ndarray
-
-
-class TrainPlaces(NamedTuple):
-    """Contacts and then pantographs along the track [m]: at the ``start``, ``now``; ``leads`` of
-    contacts on raked strips."""
-
-    start: np.ndarray
-    now: np.ndarray
-    leads: Leads
 
 
 class Pantographs:
@@ -136,10 +102,10 @@ class Pantographs:
     lateral_displacement : the last of ``across``
     outputs : ``position`` and all these of the latest step one after another
     speed : of the train [m/s]
-    places_along : TrainPlaces
+    places_along : ``native.TrainPlaces``
     along_track : whether a base or the air at a pantograph depends on its place, rank 0
     reach : how far contacts are behind and ahead of their pantographs at most [m], all ranks
-    ends : StripEnds, contacts of each strip and strips of each pantograph
+    ends : ``native.StripEnds``, contacts of each strip and strips of each pantograph
     work : of the contact forces on this rank's part of the line
 
     Raises
@@ -163,7 +129,9 @@ class Pantographs:
         offsets = [placement.data.strips.offsets for placement in train.placements]
         counts, n_wires = [len(own) for own in offsets], wires.n_wires
         of_strip, of_pantograph = np.arange(sum(counts) + 1), np.cumsum([0, *counts])
-        self.ends = StripEnds(n_wires * of_strip.astype(np.int64), of_pantograph.astype(np.int64))
+        self.ends = native.StripEnds(
+            n_wires * of_strip.astype(np.int64), of_pantograph.astype(np.int64)
+        )
         self._contacts = [
             slice(int(a), int(b)) for a, b in itertools.pairwise(n_wires * of_pantograph)
         ]
@@ -185,7 +153,7 @@ class Pantographs:
         )
         rake = [_rake(placement, simulated) for placement in train.placements]
         leads = leads_of(wires, self.candidates.wire, np.repeat(np.repeat(rake, counts), n_wires))
-        self.places_along = TrainPlaces(all_start, all_places, leads)
+        self.places_along = native.TrainPlaces(all_start, all_places, leads)
         self._move = native.move_contacts.bound(self.places_along)
         self.reach = (
             max(0.0, -min(map(min, offsets))) + max(0.0, -leads.lead.min(initial=0.0)),

@@ -30,79 +30,21 @@ import numpy as np
 
 from catenary.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import Affine, Coupled, LineResponse, Share, affine
-from catenary.solver.contact_problem.law_tangents import LawInSteps, Tangents
+from catenary.solver.contact.line_response import LineResponse, affine
+from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 
 
-class System(NamedTuple):
-    """matrix x = right of m unknowns, the length of ``right``; the matrix may have more of both.
-
-    This and the room for solving it are as ``kernels/contact_problem/active_set.hpp`` and
-    ``room.hpp`` take them.
-    """
-
-    matrix: np.ndarray
-    right: np.ndarray
-    solution: np.ndarray
-
-
-class Signs(NamedTuple):
-    """Of m unknowns: which may have any sign, ``always``; of a dependent's how many rows its
-    leader's is before it, which it acts with, 0 of others, ``behind``."""
-
-    always: np.ndarray
-    behind: np.ndarray
-
-
-class PathRoom(NamedTuple):
-    """Room for a path of simplices in up to n dimensions: ``columns`` (n + 1, n + 1), ``numbers``
-    (7, n + 1), ``counts`` (4, n + 1), ``all`` (n + 1,)."""
-
-    columns: np.ndarray
-    numbers: np.ndarray
-    counts: np.ndarray
-    all: np.ndarray
-
-
-class PivotRoom(NamedTuple):
-    """Room to pivot with up to k unknowns: ``needs``, ``excludes`` and ``partly`` (k, k),
-    ``turned`` (20 k + 100,), ``numbers`` (4, k), ``counts`` (2, k), ``marks`` (3, k), ``path`` in
-    k / 2 dimensions."""
-
-    needs: np.ndarray
-    excludes: np.ndarray
-    turned: np.ndarray
-    partly: np.ndarray
-    numbers: np.ndarray
-    counts: np.ndarray
-    marks: np.ndarray
-    path: PathRoom
-
-
-class Room(NamedTuple):
-    """Room to solve for up to k unknowns: ``factors`` (k, k), ``pivoting``, the others (k,)."""
-
-    factors: np.ndarray
-    acting: np.ndarray
-    order: np.ndarray
-    left: np.ndarray
-    change: np.ndarray
-    acts: np.ndarray
-    before: np.ndarray
-    pivoting: PivotRoom
-
-
-def room_for(k: int) -> Room:
+def room_for(k: int) -> native.Room:
     """Room to solve for up to k unknowns."""
     acting, order = np.zeros((2, k), dtype=np.int64)
     left, change = np.zeros((2, k))
     acts, before = np.zeros((2, k), dtype=bool)
     n = k // 2 + 1
     counts = np.zeros((4, n), dtype=np.int64)
-    path = PathRoom(np.zeros((n, n)), np.zeros((7, n)), counts, np.zeros(n, dtype=bool))
+    path = native.PathRoom(np.zeros((n, n)), np.zeros((7, n)), counts, np.zeros(n, dtype=bool))
     needs, excludes = np.zeros((2, k, k), dtype=bool)
-    pivoting = PivotRoom(
+    pivoting = native.PivotRoom(
         needs,
         excludes,
         turned=np.zeros(20 * k + 100, dtype=np.int64),
@@ -112,7 +54,7 @@ def room_for(k: int) -> Room:
         marks=np.zeros((3, k), dtype=bool),
         path=path,
     )
-    return Room(np.zeros((k, k)), acting, order, left, change, acts, before, pivoting)
+    return native.Room(np.zeros((k, k)), acting, order, left, change, acts, before, pivoting)
 
 
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
@@ -125,54 +67,6 @@ _NO_SOLUTION = (
 )
 # Links that the arrays have room for at first.
 _FIRST_ROOM = 32
-
-
-class Unknowns(NamedTuple):
-    """Room for the small problem with up to k unknowns: the contact forces, then compensations.
-
-    ``always`` and ``behind`` (k,) are ``Signs``, ``matrix`` (k, k), ``right`` and ``solution`` (k,)
-    a ``System``.
-    """
-
-    always: np.ndarray
-    behind: np.ndarray
-    matrix: np.ndarray
-    right: np.ndarray
-    solution: np.ndarray
-    room: Room
-
-
-class Depths(NamedTuple):
-    """Depths [m] and rates [m/s] of the gap at n contacts under forces, (n,) each."""
-
-    depth: np.ndarray
-    rate: np.ndarray
-
-
-class SmallProblem(NamedTuple):
-    """Small problem as kernels solve it; see ``small_problem.hpp``.
-
-    Attributes
-    ----------
-    heads, gap : Affine of the heads at the contacts, and room for that of the depths
-    share : of the line, summed over ranks
-    pulls : whether forces of contacts whose wire is on the strip may have any sign
-    tangents : of the contact law
-    coupled : all links
-    unknowns : room for the problem, in which the solution is left
-    found : Depths under the solution
-    max_rounds : of the active-set iteration
-    """
-
-    heads: Affine
-    share: Share
-    gap: Affine
-    pulls: bool
-    tangents: Tangents
-    coupled: Coupled
-    unknowns: Unknowns
-    found: Depths
-    max_rounds: int
 
 
 class InnerSolution(NamedTuple):
@@ -205,7 +99,7 @@ class Gap:
 
     def __init__(self, n: int) -> None:
         self.affine = affine(np.zeros(2 * n * (1 + n)), n)
-        self.found = Depths(*np.zeros((2, n)))
+        self.found = native.Depths(*np.zeros((2, n)))
         self.line = LineResponse(n, 0)
 
     def put(self, line: LineResponse, heads: Heads) -> None:
@@ -220,7 +114,7 @@ class Gap:
         if not native.subtract(heads.affine, line.line, line.present, self.affine):
             raise RunBroken(NOT_FINITE)
 
-    def under(self, force: np.ndarray, slack: np.ndarray) -> Depths:
+    def under(self, force: np.ndarray, slack: np.ndarray) -> native.Depths:
         """Depths [m] and rates [m/s] under contact forces ``force`` (n,) [N] and compensations
         ``slack`` (m,) [N]; overwritten by the next call.
 
@@ -250,13 +144,13 @@ class InnerProblem:
     unknowns : room for the problem, another one when more links need some
     """
 
-    def __init__(self, law: LawInSteps, coupled: Coupled) -> None:
+    def __init__(self, law: LawInSteps, coupled: native.Coupled) -> None:
         self.law = law
         self.gap = Gap(law.n)
         self.coupled = coupled
         self.pivoted = False
         self._room = -1
-        self._bound_to: tuple[Affine | None, LineResponse | None]
+        self._bound_to: tuple[native.Affine | None, LineResponse | None]
         self.make_room(_FIRST_ROOM)
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
@@ -265,12 +159,31 @@ class InnerProblem:
         Raises
         ------
         RunBroken
-            If the active set does not settle.
+            If the active set does not settle, or a law that is not linear finds no force.
         """
-        self.pivoted = False
-        if self.law.is_linear:
-            return self._with_tangents(line, heads)
-        return self._with_law(line, heads)
+        gap, n, m = self.gap, self.law.n, line.count
+        if m > self._room:
+            self.make_room(m)
+        gap.line = line
+        if self._bound_to[0] is not heads.affine or self._bound_to[1] is not line:
+            # Mostly they are those of the step before.
+            self._bound_to = heads.affine, line
+            problem = self.problem(heads.affine, line)
+            self._solve = native.solve.bound(problem, self.law.marched)
+        rounds, size, finite, complete, self.pivoted = self._solve()
+        if rounds < 0:
+            raise NotConverged(_NO_SOLUTION)
+        if not finite:
+            raise RunBroken(NOT_FINITE)
+        if rounds == 0:
+            raise NotConverged(
+                f"the contact law finds no force within {native.MOST_TANGENTS} tangents; take a "
+                "smaller numerics.dt_s"
+            )
+        depth, rate = gap.found
+        solution = self.unknowns.solution
+        forces = solution[:n], solution[n:size]
+        return InnerSolution(*forces, depth, rate, rounds, self.pivoted, complete)
 
     def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
         """Compensations (m,) [N] under given contact forces (n,) [N].
@@ -290,8 +203,8 @@ class InnerProblem:
         none, links = np.zeros(n), slice(n, n + m)
         native.couple(line.rows, m, coupled, none, none, self.unknowns)
         own = right[links] - matrix[links, :n] @ force
-        system = System(matrix[links, links].copy(), own, np.zeros(m))
-        signs = Signs(np.zeros(m, dtype=bool), behind[links])
+        system = native.System(own, np.zeros(m), matrix[links, links].copy())
+        signs = native.Signs(np.zeros(m, dtype=bool), behind[links])
         rounds, pivoted = native.find_solution(system, signs, _MAX_ROUNDS, room)
         self.pivoted |= pivoted
         if rounds <= 0:
@@ -303,48 +216,9 @@ class InnerProblem:
         ``line``; ``slack`` (m,) are the compensations of the links with a row [N]."""
         return not native.leaves_out(force, slack, line.rows, line.bounds, self.coupled)
 
-    def _with_law(self, line: LineResponse, heads: Heads) -> InnerSolution:
-        """Forces and compensations for a law that is not linear, by Newton's method."""
-        gap, law = self.gap, self.law
-        # Without a force heads stand highest: from there Newton's method comes from one side.
-        gap.put(line, heads)
-        law.linearise(gap.affine.place, gap.affine.rate)
-        rounds = 0
-        for number in range(native.MOST_TANGENTS):
-            found = self._with_tangents(line, heads)
-            rounds += found.rounds
-            law.linearise(found.depth, found.rate)
-            forces = found.contact_force, found.compensation
-            if native.agrees(gap.affine, line.rows, *forces, law, number):
-                return found._replace(rounds=rounds)
-        raise NotConverged(
-            f"the contact law finds no force within {native.MOST_TANGENTS} tangents; take a "
-            "smaller numerics.dt_s"
-        )
-
-    def _with_tangents(self, line: LineResponse, heads: Heads) -> InnerSolution:
-        """Forces and compensations for the law's tangents."""
-        gap, n, m = self.gap, self.law.n, line.count
-        if m > self._room:
-            self.make_room(m)
-        gap.line = line
-        if self._bound_to[0] is not heads.affine or self._bound_to[1] is not line:
-            # Mostly they are those of the step before.
-            self._bound_to = heads.affine, line
-            self._solve = native.solve.bound(self.problem(heads.affine, line))
-        rounds, size, finite, complete, pivoted = self._solve()
-        self.pivoted |= pivoted
-        if rounds <= 0:
-            raise NotConverged(_NO_SOLUTION)
-        if not finite:
-            raise RunBroken(NOT_FINITE)
-        solution = self.unknowns.solution
-        found = solution[:n], solution[n:size], *gap.found
-        return InnerSolution(*found, rounds, self.pivoted, complete)
-
-    def problem(self, heads: Affine, line: LineResponse) -> SmallProblem:
+    def problem(self, heads: native.Affine, line: LineResponse) -> native.SmallProblem:
         """Small problem as kernels solve it; ``unknowns`` are others when more links need room."""
-        return SmallProblem(
+        return native.SmallProblem(
             heads=heads,
             share=line.share,
             gap=self.gap.affine,
@@ -364,6 +238,6 @@ class InnerProblem:
         always = np.zeros(size, dtype=bool)
         always[:n] = self.law.pulls
         behind = np.zeros(size, dtype=np.int64)
-        system = System(np.zeros((size, size)), *np.zeros((2, size)))
-        self.unknowns = Unknowns(always, behind, *system, room_for(size))
+        system = np.zeros((size, size)), *np.zeros((2, size))
+        self.unknowns = native.Unknowns(always, behind, *system, room_for(size))
         self._bound_to = None, None

@@ -19,10 +19,10 @@ import numpy as np
 
 from catenary.base.errors import NotConverged, RunBroken
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import Coupled, LineResponse
+from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import LawInSteps
-from catenary.solver.kernels.native import NOWHERE
+from catenary.solver.kernels import native
 from catenary.solver.problem.problem import Numerics
 
 # Forces that grow beyond this [N] will not come back.
@@ -101,7 +101,7 @@ class Explicit(Coupling):
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Forces of the law at the extrapolation."""
         depth = heads.early_height - line.early_height
-        depth[line.present == 0.0] = NOWHERE
+        depth[line.present == 0.0] = native.NOWHERE
         force = self._applied(self.law.force(depth, heads.early_velocity - line.early_rate), line)
         self.inner.pivoted = False
         slack = self.inner.slack_under(line, force)
@@ -154,7 +154,7 @@ class Iterated(Coupling):
         )
 
 
-def make_coupling(law: LawInSteps, coupled: Coupled, numerics: Numerics) -> Coupling:
+def make_coupling(law: LawInSteps, coupled: native.Coupled, numerics: Numerics) -> Coupling:
     """The coupling that the numerics ask for; ``coupled`` as for `InnerProblem`."""
     inner = InnerProblem(law, coupled)
     if numerics.coupling == "explicit":

@@ -14,7 +14,8 @@ import numpy as np
 
 from catenary.base.mpi import MPI
 from catenary.base.petsc import event
-from catenary.solver.contact.line_response import Bounds, LineResponse
+from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.kernels import native
 
 _FIRST_CAPACITY = 32
 # Numbers before the forces in a reply, and the tag of rows.
@@ -63,7 +64,7 @@ class Exchange:
     bounds : of all shares, see ``LineResponse``
     """
 
-    def __init__(self, comm: Any, n_contacts: int, early: bool, bounds: Bounds) -> None:
+    def __init__(self, comm: Any, n_contacts: int, early: bool, bounds: native.Bounds) -> None:
         self._comm = comm
         self._n = n_contacts
         self._early, self._bounds = early, bounds

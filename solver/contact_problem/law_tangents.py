@@ -6,8 +6,6 @@ Each gives, for n contacts, own f = offset + by_depth d + by_rate d' with depth 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from catenary.base.errors import RunBroken
@@ -17,63 +15,25 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
 
-class Tangents(NamedTuple):
-    """own f = offset + by_depth d + by_rate d' at n contacts, with depth d and rate d' of the gap
-    under forces f; (n,) each [-], [N], [N/m], [N s/m]."""
-
-    own: np.ndarray
-    offset: np.ndarray
-    by_depth: np.ndarray
-    by_rate: np.ndarray
-
-
-class ReportedForces(NamedTuple):
-    """Reported forces of n contacts at the end of a step.
-
-    Attributes
-    ----------
-    gamma : weight of the latest force in the reported mean [-]; 0 reports the force itself
-    from_time : time after which a reported tensile force ends the run [s]
-    latest, reported : (n,) forces at the end of the latest step, and reported forces [N]
-    """
-
-    gamma: float
-    from_time: float
-    latest: np.ndarray
-    reported: np.ndarray
-
-
-class StepLaw(NamedTuple):
-    """A law in a loop of kernels: ``marched`` is the law unless it is linear, ``reported`` its
-    reported forces.
-    """
-
-    marched: HertzInSteps | None
-    reported: ReportedForces
-
-
 class LawInSteps:
     """A law for n contacts; by itself one of a spring and a damper, which remembers nothing.
 
     Attributes
     ----------
     n : number of contacts
-    tangents : Tangents
-    is_linear : whether the tangents are the law
+    tangents : ``native.Tangents``, those where the law was linearised last
+    marched : the law as kernels linearise it, None if the tangents are the law
     pulls : whether forces below zero are part of the law
     """
 
-    is_linear = True
+    marched: HertzInSteps | None = None
 
     def __init__(self, n: int, own: float, by_depth: float, by_rate: float, pulls: bool) -> None:
         self.n = n
-        self.tangents = Tangents(
+        self.tangents = native.Tangents(
             np.full(n, own), np.zeros(n), np.full(n, by_depth), np.full(n, by_rate)
         )
         self.pulls = pulls
-
-    def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
-        """Put the tangents at depths and rates (n,)."""
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law itself without the cut at zero (n,) [N]."""
@@ -101,9 +61,10 @@ class LawInSteps:
         """Recorded part of the forces (n,) of the latest step [N]."""
         return force
 
-    def in_loop(self) -> StepLaw:
+    def in_loop(self) -> native.StepLaw:
         """The law for a loop of kernels; forces count as they are."""
-        return StepLaw(None, ReportedForces(0.0, 0.0, np.zeros(0), np.zeros(self.n)))
+        reported = native.ReportedForces(0.0, 0.0, np.zeros(0), np.zeros(self.n))
+        return native.StepLaw(self.marched, reported)
 
     def state(self) -> np.ndarray:
         """Memory of the law, as one array."""
@@ -133,32 +94,22 @@ class HertzInSteps(LawInSteps):
     there : (n,) forces of the law at the latest point of linearisation, not cut at zero [N]
     """
 
-    is_linear = False
-
     def __init__(self, law: HertzLaw, n: int) -> None:
         super().__init__(n, 1.0, 0.0, 0.0, pulls=False)
-        self.law = law
+        self.law, self.marched = law, self
         self.speed = np.full(n, law.least_speed)
         self.there = np.zeros(n)
         self._linearise = native.linearise.bound(self)
         self._remember = native.remember.bound(self)
 
-    def linearise(self, depth: np.ndarray, rate: np.ndarray) -> None:
-        """Tangents at depths and rates (n,)."""
-        self._linearise(depth, rate)
-
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law (n,) [N]."""
-        self.linearise(depth, rate)
+        self._linearise(depth, rate)
         return self.there
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
         """Store the approach speed of open contacts."""
         self._remember(depth, rate)
-
-    def in_loop(self) -> StepLaw:
-        """The law, whose forces count as they are."""
-        return super().in_loop()._replace(marched=self)
 
     def state(self) -> np.ndarray:
         """Speeds of impact of touching contacts, or of the next impact."""
@@ -201,10 +152,10 @@ class KinematicInSteps(LawInSteps):
         """The mean over the step."""
         return self._mean
 
-    def in_loop(self) -> StepLaw:
+    def in_loop(self) -> native.StepLaw:
         """Means over the steps; none may pull once the pantographs are raised."""
-        reported = ReportedForces(self._gamma, self._from_time, self._force, self._mean)
-        return StepLaw(None, reported)
+        reported = native.ReportedForces(self._gamma, self._from_time, self._force, self._mean)
+        return native.StepLaw(None, reported)
 
     def state(self) -> np.ndarray:
         """The latest force itself."""

@@ -10,12 +10,8 @@ import numpy as np
 
 from catenary.base.errors import CatenaryError
 from catenary.mbs.head.head_arrays import drive_width
-from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.line_response import affine
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
-from catenary.solver.contact_problem.coupling import Implicit, make_coupling
-from catenary.solver.contact_problem.law_tangents import law_in_steps
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.ensemble.shared_line import Lane, SharedLine
 from catenary.solver.integrators.line_state import Motion
@@ -24,12 +20,12 @@ from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.model.switching_links import NO_LINKS, Dependents
 from catenary.solver.problem.contact_laws import uses_rate
 from catenary.solver.problem.problem import steps_of
+from catenary.solver.schemes.make_scheme import one_solve
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import find_crossings
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.time_loop.compiled_steps import Block, KeptMotions, StepParts
+from catenary.solver.time_loop.compiled_steps import step_parts
 from catenary.solver.time_loop.prepared_line import make_room, stepped_by_kernels
-from catenary.solver.time_loop.views.step_views import Shown
 from catenary.solver.window.moving_columns import Columns
 
 # Steps between two looks at signals.
@@ -141,12 +137,7 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
         pantographs.work,
         lane.motion,
     )
-    coupled = interaction.link_coupling
-    law = law_in_steps(problem, laws, pantographs.n_contacts)
-    coupling = make_coupling(
-        law, no_links() if coupled is None else coupled.coupled, problem.numerics
-    )
-    scheme = OneSolve(shared.comm, interaction, pantographs, coupling)
+    scheme = one_solve(shared.comm, problem, model, interaction, pantographs)
     make_room(scheme)
     if pantographs.lateral:
         interaction.locate()
@@ -162,38 +153,21 @@ def _steps(
 ) -> tuple[native.Steps, np.ndarray]:
     """Compiled steps of a scheme, and the rows (n_steps + 1, n_outputs) that they fill, the first
     one before the first step."""
-    pantographs, coupling = scheme.pantographs, scheme.coupling
-    assert isinstance(coupling, Implicit)
-    n = pantographs.n_contacts
+    pantographs = scheme.pantographs
     times = np.arange(1, n_steps + 1) * dt
     drives = np.zeros((n_steps, pantographs.n, drive_width(pantographs.most_contacts)))
     heads, _ = pantographs.heads_in_loop()
     pantographs.fill_drives(times, drives)
-    strips = np.zeros(2 * n * (1 + n))
-    problem = coupling.inner.problem(affine(strips, n), scheme.share)
     rows = np.zeros((n_steps + 1, pantographs.outputs.size))
     rows[0] = pantographs.outputs
-    parts = StepParts(
-        speed=float(pantographs.speed),
-        train=pantographs.places_along,
-        contacts=scheme.interaction.contacts,
-        free=None,
-        loads=[],
-        heads=heads,
-        strips=strips,
-        problem=problem,
-        law=coupling.law.in_loop(),
-        lateral_place=pantographs.lateral_place,
-        switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
-        train_outputs=pantographs,
-        outputs=pantographs.outputs,
-        shown=_nothing_of_line(motion),
-        channels=[],
-    )
+    shown = _nothing_of_line(motion)
+    parts = step_parts(scheme, heads, free=None, loads=[], shown=shown, channels=[])
     nothing = np.zeros(0)
     none = np.zeros(0, dtype=np.int64)
-    kept = KeptMotions(none, nothing, np.zeros((0, 3), np.int64), none, none, [], np.zeros((0, 0)))
-    block = Block(
+    kept = native.KeptMotions(
+        none, nothing, np.zeros((0, 3), np.int64), none, none, [], np.zeros((0, 0))
+    )
+    block = native.Block(
         times=times,
         drives=drives,
         rows=rows[1:],
@@ -205,14 +179,14 @@ def _steps(
     return native.Steps(parts, block), rows
 
 
-def _nothing_of_line(motion: Motion) -> Shown:
+def _nothing_of_line(motion: Motion) -> native.Shown:
     """Parts of the rows with values of the line."""
     no_dependents = Dependents(NO_LINKS, np.zeros(1, dtype=np.int64))
     ends = np.array([0, 1])
     columns = Columns(ends, ends, *np.zeros((2, 2, 3), dtype=np.int32))
     none = np.zeros(0, dtype=np.int64)
     links = NO_LINKS, NO_LINKS, no_dependents, no_dependents
-    return Shown(motion, none, *links, np.zeros(0), columns)
+    return native.Shown(motion, none, *links, np.zeros(0), columns)
 
 
 def _ended(

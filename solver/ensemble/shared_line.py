@@ -35,7 +35,7 @@ from catenary.solver.model.links import Links
 from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.partition import distribute
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.switching_links import NO_LINKS, LinkArrays, LinkTable, switching_links
+from catenary.solver.model.switching_links import NO_LINKS, LinkTable, switching_links
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.rest_nearby import StiffLine
 from catenary.solver.statics.line_at_rest import LineAtRest
@@ -129,26 +129,6 @@ def _displaced(
     )
 
 
-class LineExtremes(NamedTuple):
-    """Extremes of uplift and dropper force in each lane; see ``kernels/ensemble/scene_passes.hpp``.
-
-    Attributes
-    ----------
-    arms : (n_arms,) unknowns of vertical displacement at steady arms
-    droppers : LinkArrays
-    rest : (n_droppers, n_lanes) their reserves at rest [N]
-    uplift : (n_arms, n_lanes) largest displacement [m]
-    least, largest : (n_droppers, n_lanes) forces of droppers [N]
-    """
-
-    arms: np.ndarray
-    droppers: LinkArrays
-    rest: np.ndarray
-    uplift: np.ndarray
-    least: np.ndarray
-    largest: np.ndarray
-
-
 class Lane:
     """A scene's part of a shared line.
 
@@ -177,7 +157,7 @@ class SharedLine:
     steps_together : whether kernels step it in several scenes; there is nothing else if not
     columns, line : as a ``March`` has them
     lanes : one for each scene
-    extremes : LineExtremes
+    extremes : ``native.LineExtremes``
     native : compiled steps, ``native.Ensemble``
 
     Parameters
@@ -213,17 +193,19 @@ class SharedLine:
             self.comm, model, self._wires, self.line, links[0], range_of_run
         )
         arrays = passes.arrays_in_lanes(n_lanes)
-        motions = [LineState.of(arrays.motion.at(k), self.line.motion.gains) for k in lanes]
+        x, y, z, *same = arrays.motion
+        own = (native.Motion(x[k:], y[k:], z[k:], *same) for k in lanes)
+        motions = [LineState.of(motion, self.line.motion.gains) for motion in own]
         self.lanes = [Lane(*own) for own in zip(lanes, motions, links, strict=True)]
         _, droppers, _ = links[0].shown(DROPPERS)
         n, arms = droppers.law.size, model.dofs(model.mesh.steady_arms).astype(np.int64)
         self._rest = np.zeros((links[0].numbers.size, n_lanes))
         rest, *forces = np.zeros((3, n, n_lanes))
         uplift = np.zeros((arms.size, n_lanes))
-        self.extremes = LineExtremes(arms, droppers, rest, uplift, *forces)
+        self.extremes = native.LineExtremes(arms, droppers, rest, uplift, *forces)
         followed = passes.tracked(links[0].links, links[0].reserve)
         parts = passes.parts._replace(arrays=arrays)
-        self._passes = native.ScenePasses(passes.rows, passes.columns, parts)
+        self._passes = native.ScenePasses(parts)
         self._passes.track(followed, self._rest, [own.reserve for own in links])
         self.native = native.Ensemble(self._passes, self.extremes)
         for lane in self.lanes:
@@ -280,7 +262,7 @@ def _quickest(passes: StationPasses, n_scenes: int) -> int:
 
     def time_of(n: int) -> float:
         parts = passes.parts._replace(arrays=passes.arrays_in_lanes(n))
-        steps = native.ScenePasses(passes.rows, passes.columns, parts)
+        steps = native.ScenePasses(parts)
         no_links = passes.tracked(NO_LINKS, np.zeros(0))
         steps.track(no_links, np.zeros((0, n)), [np.zeros(0)] * n)
         least = math.inf
@@ -297,18 +279,13 @@ def _same_links(one: LinkTable, other: LinkTable) -> bool:
     """Whether links are the same but for their reserves at rest."""
     if one.arrays.law.size != other.arrays.law.size:
         return False
-    return (
-        np.array_equal(one.arrays.unknowns, other.arrays.unknowns)
-        and np.array_equal(one.arrays.weights, other.arrays.weights)
-        and all(
-            np.array_equal(one.arrays.law[name], other.arrays.law[name])
-            for name in one.arrays.law.dtype.names or ()
-            if name != "rest"
-        )
-        and np.array_equal(one.broken, other.broken)
-        and np.array_equal(one.leader, other.leader)
-        and np.array_equal(one.bent, other.bent)
+    law = other.arrays.law.copy()
+    law["rest"] = one.arrays.law["rest"]
+    mine, others = (
+        (links.arrays.unknowns, links.arrays.weights, links.broken, links.leader, links.bent)
+        for links in (one, other)
     )
+    return np.array_equal(one.arrays.law, law) and all(map(np.array_equal, mine, others))
 
 
 def why_alone(problem: Problem) -> str:

@@ -9,7 +9,7 @@ Audio Eng. Soc. 43, 1995): log(n)^2 numbers a step, and each is there when its s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,31 +22,6 @@ from catenary.solver.model.loads import MemoryLoad
 
 # Lags below this are summed one by one; a power of two.
 NEAR = native.NEAR
-
-
-class MemoryTables(NamedTuple):
-    """Memory of all ends of a rank, one after another: where the parts of each begin is in
-    ``ends``, see ``memories.hpp``."""
-
-    ends: np.ndarray
-    past: np.ndarray
-    sums: np.ndarray
-    near: np.ndarray
-    spectra: np.ndarray
-    room: np.ndarray
-    turns: np.ndarray
-
-
-class Memories(NamedTuple):
-    """All ends' unknowns ``into`` loads and of their ``own`` among accelerations, and the latter as
-    ``shares`` (2,) of two arrays, the ``latest`` and the ``known`` ones."""
-
-    into: np.ndarray
-    own: np.ndarray
-    latest: np.ndarray
-    known: np.ndarray
-    shares: np.ndarray
-    tables: MemoryTables
 
 
 class EndMemories:
@@ -74,7 +49,7 @@ class EndMemories:
             for load in loads
         ]
         mine = [load for load, own in zip(loads, owns, strict=True) if own]
-        self._all, self._mine, self._owner = list(loads), mine, domain.first
+        self._all, self._mine = list(loads), mine
         self.places = np.concatenate(
             [np.zeros(0, np.int64), *(load.unknowns - domain.low for load in mine)]
         )
@@ -98,7 +73,7 @@ class EndMemories:
             latest = known = motion.read[2]
             shares = np.array([1.0, 0.0])
         places = self.places.astype(np.int64), self._own.astype(np.int64)
-        self.arguments = Memories(*places, latest, known, shares, self._tables)
+        self.arguments = native.Memories(*places, latest, known, shares, self._tables)
 
     def share(self) -> None:
         """Send the forces to ranks that solve for them, too. Collective among these."""
@@ -180,7 +155,7 @@ class EndMemories:
                     self._requests.append(comm.Recv_init(buffer, source=rank, tag=number))
 
 
-def tables_of(ends: list[tuple[np.ndarray, float]]) -> MemoryTables:
+def tables_of(ends: list[tuple[np.ndarray, float]]) -> native.MemoryTables:
     """Tables of ends with numbers Q (n, m, m) of all lags, and the time step [s] of each."""
     table = np.zeros(len(ends), dtype=native.END_MEMORY)
     near, spectra = [np.zeros(0)], [np.zeros(0, dtype=complex)]
@@ -217,7 +192,7 @@ def tables_of(ends: list[tuple[np.ndarray, float]]) -> MemoryTables:
         sizes += (m * n, m * n, near[-1].size, size)
     room = np.zeros((widest + 1, turns.size), dtype=complex)
     past, sums = np.zeros(sizes[0]), np.zeros(sizes[1])
-    return MemoryTables(
+    return native.MemoryTables(
         table, past, sums, np.concatenate(near), np.concatenate(spectra), room, turns
     )
 
@@ -230,9 +205,9 @@ def _levels_of(n: int) -> int:
     return levels
 
 
-def _none() -> Memories:
+def _none() -> native.Memories:
     nowhere, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
-    return Memories(nowhere, nowhere, nothing, nothing, np.array([1.0, 0.0]), tables_of([]))
+    return native.Memories(nowhere, nowhere, nothing, nothing, np.array([1.0, 0.0]), tables_of([]))
 
 
 # ``EndMemories.arguments`` of a line without memories.

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -31,33 +31,6 @@ from catenary.solver.problem.integrator_parameters import Integration
 
 # Share of dt^2 below which the acceleration cannot be found from what a prediction takes from it.
 _LEAST_SHARE = 1e-3
-
-
-class AlphaFactors(NamedTuple):
-    """Factors of a step's predictions by the algorithm's accelerations.
-
-    With b the acceleration that balances the forces at the end of a step, the algorithm's is
-    a = p + r b, where p is known when the step begins.
-
-    Attributes
-    ----------
-    dt : step [s]
-    ratio : r
-    known_of_balanced, known_of_own : shares of b and a of the step before in p
-    position_of_own, position_of_known : factors of a before and of p in the displacement [s2]
-    velocity_of_own, velocity_of_known : factors of both in the velocity [s]
-    damping_on_stiffness : c, so that a product with K of d + c v gives elastic and damping forces
-    """
-
-    dt: float
-    ratio: float
-    known_of_balanced: float
-    known_of_own: float
-    position_of_own: float
-    position_of_known: float
-    velocity_of_own: float
-    velocity_of_known: float
-    damping_on_stiffness: float
 
 
 class GeneralizedAlphaLine(LineIntegrator):
@@ -81,7 +54,7 @@ class GeneralizedAlphaLine(LineIntegrator):
         factors = ratio * beta * dt**2, ratio * gamma * dt
         super().__init__(comm, model, ownership, *factors, wanted)
         self._known = aligned_arrays.zeros(ownership.n_local, 4)
-        self._by = AlphaFactors(
+        self._by = native.Alpha(
             dt=dt,
             ratio=ratio,
             known_of_balanced=force_weight / (1.0 - mass_weight),

@@ -18,7 +18,12 @@ from catenary.base.mpi import MPI
 from catenary.base.parallel import total
 from catenary.base.petsc import PETSc
 from catenary.solver.integrators.line_loads import LineLoads
-from catenary.solver.integrators.line_state import AlphaSteps, LineState, PredictedLineState, Steps
+from catenary.solver.integrators.line_state import (
+    AlphaSteps,
+    LineState,
+    Newmark,
+    PredictedLineState,
+)
 from catenary.solver.integrators.slow_path import GENERAL, LIBRARY, PARTS, SlowPath
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays, native
@@ -50,6 +55,7 @@ class LineIntegrator(ABC):
     operators : LineOperators
     responses : UnitResponses of the step operator
     loads : LineLoads, None if there are none
+    passes : free steps in compiled code, None if these are taken in parts
     solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
     slow_path : why ``keep_ahead`` could not, None if it could; the same on all ranks
     window : MovingWindow, None if all stations move
@@ -98,7 +104,7 @@ class LineIntegrator(ABC):
             self._shares = 1.0 + self.velocity_factor * beta_damping, stiffness_share
         n = ownership.n_local
         gains = self.position_factor, self.velocity_factor
-        self._passes: StationPasses | None = None
+        self.passes: StationPasses | None = None
         self.loads: LineLoads | None = None
         if model.loads:
             self.loads = LineLoads(model.loads, self.operators.domain, model.constrained, comm)
@@ -112,11 +118,6 @@ class LineIntegrator(ABC):
         self.track_links(NO_LINKS, np.zeros(0))
         # PETSc's time loop wants the solution as a vector; it wraps our array.
         self.solution = PETSc.Vec().createWithArray(self.displacement, size=(n, None), comm=comm)
-
-    @property
-    def passes(self) -> StationPasses | None:
-        """Free steps in compiled code, None if these are taken in parts."""
-        return self._passes
 
     def load_at(self, time: float) -> None:
         """Take the loads of the step to ``time`` [s]. Collective."""
@@ -144,7 +145,7 @@ class LineIntegrator(ABC):
         if not self._comm.allreduce(int(can), op=MPI.MIN):
             self.slow_path = SlowPath(self.operators.why_not_by_stations(), LIBRARY)
             return
-        self._passes = passes
+        self.passes = passes
         general = passes is not None and not passes.are_compiled
         if self._comm.allreduce(int(general), op=MPI.MAX):
             self.slow_path = SlowPath(
@@ -158,7 +159,7 @@ class LineIntegrator(ABC):
         if self.loads is not None:
             self.loads.read(motion)
 
-    def _ahead(self) -> tuple[PredictedLineState, Steps | AlphaSteps] | None:
+    def _ahead(self) -> tuple[PredictedLineState, Newmark | AlphaSteps] | None:
         """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.
 
         None if the method cannot.
@@ -231,14 +232,14 @@ class LineIntegrator(ABC):
         The links stand in the order along the track. Without this there are none. Not collective.
         """
         self._links = links, reserve
-        if self._passes is not None:
-            self._passes.track_links(links, reserve)
+        if self.passes is not None:
+            self.passes.track_links(links, reserve)
 
     def open_window(self, window: MovingWindow) -> None:
         """Take steps of the stations in a window only from now on. One rank, in two passes."""
-        assert self._passes is not None
+        assert self.passes is not None
         self.window = window
-        self._passes.open(window.arrays, *self._links)
+        self.passes.open(window.arrays, *self._links)
 
     def provide(self, way: float) -> None:
         """Have what steps need until contacts are a ``way`` [m] further. Not collective."""
@@ -248,11 +249,12 @@ class LineIntegrator(ABC):
     def free_step(self) -> None:
         """Take the step without contacts and slack droppers: in two passes, or by ``predict``,
         ``free_acceleration`` and ``correct``. After ``load_at``. Collective."""
-        if self._passes is not None:
+        if self.passes is not None:
             if self._comm.size > 1:
-                self._passes.predict_velocities()
+                # Products with C of other ranks read them before a step fills them in itself.
+                self.passes.native.predict_velocities()
                 self.operators.exchange()
-            self._passes.step()
+            self.passes.native.step()
             return
         self.predict()
         self.free_acceleration()

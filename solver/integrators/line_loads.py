@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from catenary.base.mpi import MPI
-from catenary.solver.integrators.end_memory import NO_MEMORIES, EndMemories, Memories
+from catenary.solver.integrators.end_memory import NO_MEMORIES, EndMemories
 from catenary.solver.integrators.line_state import LineState
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.halo import Subdomain
@@ -24,38 +24,6 @@ from catenary.solver.model.loads import (
 
 # Size of the samples of a load [B], and the most slices that are made at once.
 _BYTES, _MOST_SLICES = 2**24, 512
-
-
-class Changing(NamedTuple):
-    """Places that change with factors, their terms as rows of a sparse matrix, and the factors with
-    their numbers; see ``loads.hpp``, as for the next two."""
-
-    places: np.ndarray
-    begins: np.ndarray
-    terms: np.ndarray
-    forces: np.ndarray
-    factors: np.ndarray
-    numbers: np.ndarray
-
-
-class Sampled(NamedTuple):
-    """Loads whose forces are made ahead, side by side."""
-
-    loads: np.ndarray
-    times: np.ndarray
-    places: np.ndarray
-    samples: np.ndarray
-
-
-class LoadArguments(NamedTuple):
-    """All loads, whose ``values`` are to be those at ``clock`` (1,) [s]; ``constant`` stays."""
-
-    clock: np.ndarray
-    values: np.ndarray
-    constant: np.ndarray
-    changing: Changing
-    sampled: Sampled
-    memories: Memories
 
 
 class LineLoads:
@@ -113,7 +81,7 @@ class LineLoads:
         remembered = np.zeros(0, np.int64) if self.memories is None else self.memories.places
         changing = _changing_of(shapes, np.concatenate([sampled.places, remembered]))
         self.changes = bool(changing.places.size)
-        self.arguments = LoadArguments(
+        self.arguments = native.Loads(
             np.zeros(1), self.values, constant, changing, sampled, NO_MEMORIES
         )
         self.read(None)
@@ -217,7 +185,7 @@ class _Sampled:
 
 def _changing_of(
     shapes: list[tuple[ShapeLoad, np.ndarray, np.ndarray]], others: np.ndarray
-) -> Changing:
+) -> native.Changing:
     """Sparse table of the forces of ``shapes``, each with its places and forces there; ``others``
     are further places that change."""
     at = np.concatenate([np.zeros(0, np.int64), *(places for _, places, _ in shapes)])
@@ -234,10 +202,10 @@ def _changing_of(
     factors["kind"] = [load.factor.kind for load, _, _ in shapes]
     factors["begin"], factors["end"] = ends[:-1], ends[1:]
     all_numbers = np.concatenate([np.zeros(0), *numbers])
-    return Changing(places, begins, terms, matrix.data, factors, all_numbers)
+    return native.Changing(places, begins, terms, matrix.data, factors, all_numbers)
 
 
-def _side_by_side(loads: list[_Sampled]) -> Sampled:
+def _side_by_side(loads: list[_Sampled]) -> native.Sampled:
     """All of them, in arrays that each then works in."""
     places = np.concatenate([np.zeros(0, np.int64), *(load.places for load in loads)])
     times = np.concatenate([np.zeros(0), *(load.times for load in loads)])
@@ -251,4 +219,4 @@ def _side_by_side(loads: list[_Sampled]) -> Sampled:
         load.samples = samples[at : at + size].reshape(shape)
         load.held = table["held"][number : number + 1]
         place, begin, at = place + load.places.size, begin + load.times.size, at + size
-    return Sampled(table, times, places, samples)
+    return native.Sampled(table, times, places, samples)

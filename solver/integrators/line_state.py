@@ -15,47 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.solver.kernels import native
-
-
-class Motion(NamedTuple):
-    """x, y and z (n_local,) each, and their shares (5,), as kernels read the motion.
-
-    Numbers of an unknown are ``spacing`` behind those of the one before: more than one where scenes
-    stand in lanes.
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    z: np.ndarray
-    shares: np.ndarray
-    spacing: int = 1
-
-    def at(self, lane: int) -> Motion:
-        """The motion in one lane."""
-        return self._replace(x=self.x[lane:], y=self.y[lane:], z=self.z[lane:])
-
-
-class Steps(NamedTuple):
-    """Factors of a step of Newmark's method.
-
-    Attributes
-    ----------
-    dt : time step [s]
-    predict_position, predict_velocity : factors of the acceleration before the step in the
-        predictions of displacement [s2] and velocity [s]
-    work_velocity : c, so that K (d + c v) gives elastic forces and those of damping on K [s]
-    position_factor, velocity_factor : factors of the acceleration after the step in displacement
-        [s2] and velocity [s]
-    damping_share : part of damping on mass that the acceleration lacks [1/s]
-    """
-
-    dt: float
-    predict_position: float
-    predict_velocity: float
-    work_velocity: float
-    position_factor: float
-    velocity_factor: float
-    damping_share: float
+from catenary.solver.kernels.native import Motion, Newmark
 
 
 class LineState:
@@ -63,7 +23,7 @@ class LineState:
 
     Attributes
     ----------
-    read : Motion
+    read : ``native.Motion``
     gains : (3,) what x, y and z gain from a unit of acceleration that is found later in the step
 
     Parameters
@@ -80,7 +40,7 @@ class LineState:
         gains: tuple[float, float],
     ) -> None:
         shares = np.array([1.0, 0.0, 0.0, 1.0, 0.0])
-        self.read = Motion(displacement, velocity, acceleration, shares)
+        self.read = Motion(displacement, velocity, acceleration, shares, 1)
         self.gains = np.array([*gains, 1.0])
 
     @classmethod
@@ -139,7 +99,7 @@ class PredictedLineState(LineState):
         velocity: np.ndarray,
         acceleration: np.ndarray,
         shown: np.ndarray,
-        steps: Steps,
+        steps: Newmark,
     ) -> None:
         dt, c_position, c_velocity, c_work, position_factor, velocity_factor, _ = steps
         by_velocity = velocity_factor + c_velocity

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.line_state import PredictedLineState, Steps
+from catenary.solver.integrators.line_state import Newmark, PredictedLineState
 from catenary.solver.integrators.slow_path import (
     CALLED,
     PARTS,
@@ -35,7 +35,7 @@ class NewmarkLine(LineIntegrator):
     ) -> None:
         dt, beta, gamma = numerics.dt, numerics.beta, numerics.gamma
         super().__init__(comm, model, ownership, beta * dt**2, gamma * dt, wanted)
-        self._steps = Steps(
+        self._steps = Newmark(
             dt,
             0.5 * dt**2 * (1.0 - 2.0 * beta),
             dt * (1.0 - gamma),
@@ -45,7 +45,7 @@ class NewmarkLine(LineIntegrator):
             self._beta_share,
         )
 
-    def _ahead(self) -> tuple[PredictedLineState, Steps]:
+    def _ahead(self) -> tuple[PredictedLineState, Newmark]:
         operators, (shown, velocity, acceleration) = self.operators, self.motion.read[:3]
         if not self._proportional:
             velocity = operators.rate  # which products with C read

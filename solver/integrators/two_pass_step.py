@@ -8,24 +8,19 @@ wait for. Two chains of stations go side by side, each of which waits for itself
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from itertools import starmap
 
 import numpy as np
 
 from catenary.solver.integrators.line_state import (
     AlphaAhead,
     AlphaSteps,
-    Motion,
+    Newmark,
     PredictedLineState,
-    Steps,
 )
 from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.linear.station_factors import FactorArrays
-from catenary.solver.linear.stations.station_products import ProductArrays
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
-from catenary.solver.window.moving_window import WindowArrays
 
 # Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
 # memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
@@ -33,85 +28,16 @@ _STRETCH = 8192
 _NO_LOADS = np.zeros(0)
 
 
-class PassArrays(NamedTuple):
-    """Arrays that passes read and fill: inputs of the products with K and with C; loads of all
-    unknowns that are solved for, or none; accelerations of these; the motion of the rank's own
-    stations; known accelerations and predicted velocities of these, or none."""
-
-    factor: np.ndarray
-    velocity: np.ndarray
-    loads: np.ndarray
-    answer: np.ndarray
-    motion: Motion
-    known: np.ndarray
-    predicted: np.ndarray
-
-
-class Changes(NamedTuple):
-    """Coefficients that take a state from one prediction to the next.
-
-    Attributes
-    ----------
-    dt : time step [s]
-    by_position, by_velocity : gains of x [s2] and y [s] by the acceleration found in the step
-    damping_share : part of damping on mass that the acceleration lacks [1/s]
-    known, velocity, balance : for the generalized-alpha method, factors of z and of the known
-        acceleration before a step in the known acceleration of the step, in the predicted velocity
-        and in z; zero for Newmark's
-    by_mass : if not 0, products are with M, and ``by_mass`` times their operand is added to the
-        answer
-    """
-
-    dt: float
-    by_position: float
-    by_velocity: float
-    damping_share: float
-    known: tuple[float, float]
-    velocity: tuple[float, float]
-    balance: tuple[float, float]
-    by_mass: float
-
-
-class PassParts(NamedTuple):
-    """Inputs of passes besides layouts; ``station_types`` as in ``Sections``."""
-
-    station_types: Sequence[Sequence[int]]
-    rows: ProductArrays
-    factors: FactorArrays
-    arrays: PassArrays
-    changes: Changes
-
-
-class TrackedLinks(NamedTuple):
-    """Links whose reserve the pass back computes, stretch by stretch.
-
-    Attributes
-    ----------
-    links : LinkArrays in the order along the track
-    reserve : (n_links,) filled at the end of each step [N]
-    ranges : (n + 1, 2) first link that the pass has left behind after each stretch, and the one
-        after the last
-    stretch : pairs of stations in a stretch
-    """
-
-    links: LinkArrays
-    reserve: np.ndarray
-    ranges: np.ndarray
-    stretch: int
-
-
 class StationPasses:
     """Takes free steps. Not collective.
 
     Attributes
     ----------
-    native : compiled step, for loops that take steps themselves
+    native : compiled steps
     are_compiled : whether kernels were compiled for what its stations join
-    rows, columns : layouts of each station type, of rows and of factors, as kernels take them
-    parts : PassParts
+    parts : ``native.PassParts``
     factors : as given
     known : accelerations that the motion keeps besides x, y and z, or none
-    by_mass : whether right-hand sides are products with M, where these are shorter than with K
 
     Parameters
     ----------
@@ -129,24 +55,24 @@ class StationPasses:
         parts: ByStations,
         loads: np.ndarray,
         motion: PredictedLineState,
-        steps: Steps | AlphaSteps,
+        steps: Newmark | AlphaSteps,
     ) -> None:
         product, factors, read, velocity, answer, by_mass = parts
         _, _, low, high, _ = factors.ends.tolist()
-        self.by_mass, self.factors = by_mass != 0.0, factors
+        self.factors = factors
         changes = changes_of(motion, steps, by_mass)
         known = predicted = np.zeros(0)
         if isinstance(motion, AlphaAhead):
             known, predicted = motion.known, motion.predicted
         self._starts = factors.starts[low : high + 1] - factors.starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
-        self.rows = rows = [part.native for part in product.layout.parts]
-        self.columns = columns = [part.native for part in factors.layout.parts]
-        self.are_compiled = all(map(native.are_compiled, rows, columns))
-        arrays = PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
+        pairs = zip(product.layout.parts, factors.layout.parts, strict=True)
+        layouts = [(rows.native, columns.native) for rows, columns in pairs]
+        self.are_compiled = all(starmap(native.are_compiled, layouts))
+        arrays = native.PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
         stations = product.stations.station_types, product.arrays, factors.arrays
-        self.parts = PassParts(*stations, arrays, changes)
-        self.native = native.TwoPasses(rows, columns, self.parts)
+        self.parts = native.PassParts(layouts, *stations, arrays, changes)
+        self.native = native.TwoPasses(self.parts)
         self.known = known
         self.track_links(NO_LINKS, np.zeros(0))
 
@@ -157,20 +83,20 @@ class StationPasses:
         """
         self.native.track(self.tracked(links, reserve))
 
-    def tracked(self, links: LinkArrays, reserve: np.ndarray) -> TrackedLinks:
+    def tracked(self, links: LinkArrays, reserve: np.ndarray) -> native.TrackedLinks:
         """Arguments of the kernels for ``track_links``."""
         n_pairs = max(0, self._starts.size - 2) // 2
         n_stretches = -(-n_pairs // self._stretch)
         ranges = np.zeros((1 + max(1, n_stretches), 2), dtype=np.int64)
         native.left_behind(self._starts, self._stretch, links.unknowns, ranges)
-        return TrackedLinks(links, reserve, ranges, self._stretch)
+        return native.TrackedLinks(links, reserve, ranges, self._stretch)
 
     @property
     def scenes_at_once(self) -> list[int]:
         """Numbers of scenes, ascending, that kernels step side by side on this line."""
-        return native.scenes_at_once(self.rows, self.columns)
+        return native.scenes_at_once(self.parts.layouts)
 
-    def arrays_in_lanes(self, n_lanes: int, is_loaded: bool = False) -> PassArrays:
+    def arrays_in_lanes(self, n_lanes: int, is_loaded: bool = False) -> native.PassArrays:
         """Arrays of ``n_lanes`` motions at rest; values of an unknown in all lanes are contiguous.
 
         Loads [N] of whole pairs of unknowns, if there are any, stand where a step puts the
@@ -188,7 +114,7 @@ class StationPasses:
         )
         answer = loads[: n * n_lanes]
         reads_rates = np.shares_memory(given.velocity, given.motion.y)
-        motion = Motion(factor[own], velocity[own], answer, given.motion.shares, n_lanes)
+        motion = native.Motion(factor[own], velocity[own], answer, given.motion.shares, n_lanes)
         return given._replace(
             factor=factor,
             velocity=velocity if reads_rates else factor,
@@ -197,41 +123,32 @@ class StationPasses:
             motion=motion,
         )
 
-    def open(self, window: WindowArrays, links: LinkArrays, reserve: np.ndarray) -> None:
+    def open(self, window: native.Window, links: LinkArrays, reserve: np.ndarray) -> None:
         """Step only the stations in ``window`` from now on; ``links`` and ``reserve`` as in
         ``track_links``."""
         self.native.open(window)
-        self.native.track(TrackedLinks(links, reserve, window.ranges, window.low.size))
-
-    def predict_velocities(self) -> None:
-        """Compute the rank's own predicted velocities, which a product with C on other ranks reads.
-
-        A step computes them as well, but after the other ranks have read.
-        """
-        self.native.predict_velocities()
-
-    def step(self) -> None:
-        """Find the accelerations and what the next step starts from."""
-        self.native.step()
+        self.native.track(native.TrackedLinks(links, reserve, window.ranges, window.low.size))
 
 
-def changes_of(motion: PredictedLineState, steps: Steps | AlphaSteps, by_mass: float) -> Changes:
+def changes_of(
+    motion: PredictedLineState, steps: Newmark | AlphaSteps, by_mass: float
+) -> native.Changes:
     """Coefficients that take ``motion`` from one prediction to the next.
 
-    ``steps`` are the factors of its method, ``by_mass`` as in ``Changes``.
+    ``steps`` are the factors of its method, ``by_mass`` as in ``native.Changes``.
     """
     by_position, by_velocity, _ = map(float, motion.gains)
     nothing = 0.0, 0.0
-    if isinstance(steps, Steps):
+    if isinstance(steps, Newmark):
         newmark = steps.dt, by_position, by_velocity, steps.damping_share
-        return Changes(*newmark, nothing, nothing, nothing, by_mass)
+        return native.Changes(*newmark, nothing, nothing, nothing, by_mass)
     of_balanced, of_known = steps.balance
 
     def from_kept(shares: tuple[float, float]) -> tuple[float, float]:
         """Shares of b and p as those of z and p."""
         return shares[0] / of_balanced, shares[1] - shares[0] * of_known / of_balanced
 
-    return Changes(
+    return native.Changes(
         dt=steps.dt,
         # z of the end of the step stands for its part of the coming prediction.
         by_position=by_position + of_balanced,

@@ -119,7 +119,7 @@ class LineProducts:
         """The product with the operator that is solved with, by its rows."""
         assert self.layout is not None
         rows = self._sections(self._domain.low, self._domain.high)
-        return station_product(operator, 0, self.layout, columns=rows)
+        return station_product(operator, 0, self.layout, rows)
 
     def _product(self, rows: StationRows, damped: bool) -> StationProduct | None:
         assert self.layout is not None
@@ -127,7 +127,7 @@ class LineProducts:
         if damped:
             damping = self._rows_of("damping")
             layout = with_damping(layout, None if damping is None else damping.blocks)
-        return station_product(rows, first, layout, damping, columns)
+        return station_product(rows, first, layout, columns, damping)
 
     def instead_of_stiffness(self, mass: float, stiffness: float) -> StationProduct | None:
         """The product with P = -(``mass`` / ``stiffness``) M, where A = ``mass`` M + ``stiffness``
@@ -148,7 +148,7 @@ class LineProducts:
         if found.n_products + FEWER * found.n_vectors > of_stiffness.n_products:
             return None
         columns, first = self._columns()
-        return station_product(rows, first, layout, None, columns)
+        return station_product(rows, first, layout, columns)
 
     def find_layout(self, coefficients: tuple[float, float, float]) -> StationRows | None:
         """Find how unknowns of a station stand in lanes, if they can, from K and from the operator

@@ -115,8 +115,8 @@ class PartSolver(KspSolver):
     own : range of the rank's own blocks in the part
     in_stations : whether the blocks are stations
     is_whole : whether the part is the whole line, which decides the prefix of its options
-    layout, stations : of the stations of the part, None if our own factors cannot be used
-    rows : the part by stations, if it is known
+    layout, stations, rows : of the part by stations, None if our own factors cannot be used or
+        have been made
     turns : whether the place where our own elimination ends may move
     factors : our own factors, if they have been made
 
@@ -140,9 +140,8 @@ class PartSolver(KspSolver):
         self._part, self._in_stations = part, in_stations
         self._prefix = PREFIX if is_whole else PART_PREFIX
         self.factors = factors
-        if factors is None and layout is not None and not _is_given(f"{self._prefix}pc_"):
-            matrix = part() if rows is None else rows
-            self.factors = station_factors(matrix, layout, own.start, own.stop, stations, turns)
+        if layout and stations and rows and not _is_given(f"{self._prefix}pc_"):
+            self.factors = station_factors(rows, layout, stations, own.start, own.stop, turns)
         self._made: list[Callable[[], object]] = []  # what frees PETSc's objects
         self._solve: Callable[[Wrapped, Wrapped], None] = super().solve
         if self.factors is None or _is_given(f"{self._prefix}ksp_", f"{self._prefix}mat_"):

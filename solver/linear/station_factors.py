@@ -13,78 +13,16 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from catenary.base.petsc import PETSc
 from catenary.solver.kernels import native
-from catenary.solver.linear.stations.sections import Places, Sections
+from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_products import kinds_by_type, of_pairs
-from catenary.solver.linear.stations.station_rows import StationRows, rows_of
+from catenary.solver.linear.stations.station_rows import StationRows
 
 # Distance in stations between the places at which elimination may end, if there are several.
 MIDDLES = native.MIDDLES
-
-
-class Turning(NamedTuple):
-    """Kinds of stations by the place where elimination ends, for lines on which it moves.
-
-    Attributes
-    ----------
-    to_end, to_start : (n,) kind of each station if elimination ends behind it, or before it
-    here : (m,) kind of every station number i ``MIDDLES`` if elimination ends there
-    """
-
-    to_end: np.ndarray
-    to_start: np.ndarray
-    here: np.ndarray
-
-    def place(self, low: int, high: int) -> int:
-        """A station where it may end, near the middle from ``low`` to ``high``."""
-        return int(native.middle_of(low, high))
-
-
-class StationBlocks(NamedTuple):
-    """Blocks (k, b, b) of each kind of station: to the station ``before``, its ``own``, and to the
-    station ``after``; see ``StationRows``."""
-
-    before: np.ndarray
-    own: np.ndarray
-    after: np.ndarray
-
-
-class Eliminated(NamedTuple):
-    """Stations after elimination from one end.
-
-    Attributes
-    ----------
-    factors : (m, 2, b, b) S^-1 and -S^-1 B of each factor; S is the diagonal block after
-        elimination, B joins it to the next station
-    kinds : (m,) kind of station that each factor is of
-    numbers : (n,) int32, the factor of each station
-    """
-
-    factors: np.ndarray
-    kinds: np.ndarray
-    numbers: np.ndarray
-
-
-def eliminate_stations(kinds: np.ndarray, blocks: StationBlocks, from_end: bool) -> Eliminated:
-    """Stations of ``kinds`` (n,) int32 eliminated one after the other, from the start of the line
-    or ``from_end``."""
-    return Eliminated(*native.eliminate(kinds, blocks, from_end))
-
-
-class FactorArrays(NamedTuple):
-    """Arrays of ``StationFactors`` as kernels read them."""
-
-    kinds: np.ndarray
-    blocks: np.ndarray
-    beside_kinds: np.ndarray
-    besides: np.ndarray
-    low: int
-    ends: np.ndarray
-    sections: Places
 
 
 class StationFactors:
@@ -105,7 +43,7 @@ class StationFactors:
     turning : arrays by which the place where elimination ends moves, None if it stays
     n_stations, n_kinds : in the matrix, and how many have different factors
     stations : Sections
-    arrays : FactorArrays
+    arrays : ``native.FactorArrays``
     """
 
     def __init__(
@@ -118,19 +56,19 @@ class StationFactors:
         high: int,
         n_kinds: int,
         besides: tuple[np.ndarray, np.ndarray],
-        turning: Turning | None = None,
+        turning: native.Turning | None = None,
     ) -> None:
         self.layout, self.kinds, self.blocks = layout, kinds, blocks
         self.beside_kinds, self.besides = besides
         self.starts, self.stations = stations.starts, stations
         self.low, self.turning = low, turning
         self.n_stations, self.n_kinds = kinds.size, n_kinds
-        middle = (low + high) // 2 if turning is None else turning.place(low, high)
+        middle = (low + high) // 2 if turning is None else native.middle_of(low, high)
         self.ends = np.array([0, kinds.size, low, high, middle], dtype=np.int64)
         if turning is not None:
             native.turn(kinds, turning, kinds.size - 1, middle)
         numbers = self.kinds, self.blocks, self.beside_kinds, self.besides
-        self.arrays = FactorArrays(*numbers, low, self.ends, stations.places())
+        self.arrays = native.FactorArrays(*numbers, low, self.ends, stations.places())
 
     @cached_property
     def _solves(self) -> native.Solves:
@@ -154,28 +92,23 @@ class StationFactors:
 
 
 def station_factors(
-    matrix: sparse.bsr_matrix | StationRows,
+    rows: StationRows,
     layout: Layout,
+    stations: Sections,
     low: int = 0,
     high: int | None = None,
-    stations: Sections | None = None,
     turns: bool = False,
 ) -> StationFactors | None:
-    """Factors of a positive definite matrix in sorted blocks, or of its rows by stations.
+    """Factors of a positive definite matrix, given by its rows by stations.
 
     It is eliminated towards the middle of the stations from ``low`` to ``high``, all by default.
     ``stations`` may be of several station types. The middle may be moved if it ``turns``.
 
-    None if it is not block tridiagonal by stations, or if a station is joined to unknowns of one
-    beside it that it lacks itself. A matrix that is not positive definite gives
-    wrong answers or NaN.
+    None if a station is joined to unknowns of one beside it that it lacks itself. A matrix that is
+    not positive definite gives wrong answers or NaN.
     """
-    rows = rows_of(matrix, 0, stations)
-    if rows is None:
-        return None
     n = rows.kinds.size
     high = n if high is None else high
-    stations = Sections.alike(n, layout.pitch) if stations is None else stations
     rows = completed(rows, stations)
     layout = layout_of_factors(layout, rows.blocks)
     besides = besides_of(layout, stations, rows)
@@ -187,7 +120,7 @@ def station_factors(
     of_station = kinds[found.numbers]
     if not turns:
         return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, besides)
-    turning = Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :])
+    turning = native.Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :])
     of_station = of_station[:n].copy()
     return StationFactors(
         layout, stations, of_station, numbers, low, high, n_kinds, besides, turning
@@ -257,7 +190,8 @@ class FoundFactors(NamedTuple):
 
     Attributes
     ----------
-    factors : (m, 2, b, b) S^-1 and -S^-1 B of each, see ``Eliminated``
+    factors : (m, 2, b, b) S^-1 and -S^-1 B of each; S is the diagonal block after elimination, B
+        joins it to the next station
     kinds : (m,) kind of station that each factor is of
     numbers : factor of each station: (n,) for a given middle; for a middle that moves (n,) for
         stations before it, then (n,) for those behind it, then one for each place of the middle
@@ -273,24 +207,24 @@ class FoundFactors(NamedTuple):
         kinds, blocks, n = rows.kinds, rows.blocks, rows.kinds.size
         meeting = np.arange(0, n, MIDDLES) if middle is None else np.array([middle])
         first, last = (n, 0) if middle is None else (middle, middle + 1)
-        matrix = StationBlocks(*blocks)
-        before = eliminate_stations(kinds[:first], matrix, from_end=False)
-        behind = eliminate_stations(kinds[last:], matrix, from_end=True)
+        matrix = native.StationBlocks(*blocks)
+        before, kinds_before, at_before = native.eliminate(kinds[:first], matrix, False)
+        behind, kinds_behind, at_behind = native.eliminate(kinds[last:], matrix, True)
         # The stations that the middle joins, one more at each end that is none.
-        earlier = np.concatenate([[-1], before.numbers])[meeting]
-        later = np.concatenate([behind.numbers, [-1]])[meeting + 1 - last]
+        earlier = np.concatenate([[-1], at_before])[meeting]
+        later = np.concatenate([at_behind, [-1]])[meeting + 1 - last]
         triples, at_middle = np.unique(
             np.stack([kinds[meeting], earlier, later], axis=1), axis=0, return_inverse=True
         )
-        here = np.zeros((len(triples), *before.factors.shape[1:]))
+        here = np.zeros((len(triples), *before.shape[1:]))
         meetings = np.ascontiguousarray(triples).view(native.MEETING)[:, 0]
-        native.join(meetings, matrix, before.factors, behind.factors, here)
-        n_before, n_behind = len(before.factors), len(behind.factors)
-        parts = [before.numbers, n_before + behind.numbers, n_before + n_behind + at_middle.ravel()]
+        native.join(meetings, matrix, before, behind, here)
+        n_before, n_behind = len(before), len(behind)
+        parts = [at_before, n_before + at_behind, n_before + n_behind + at_middle.ravel()]
         numbers = np.concatenate(parts if middle is None else [parts[0], parts[2], parts[1]])
         found, first_met, number = np.unique(numbers, return_index=True, return_inverse=True)
         order = np.argsort(first_met)
-        factors = np.concatenate([before.factors, behind.factors, here])
-        of_factor = np.concatenate([before.kinds, behind.kinds, triples[:, 0]])
+        factors = np.concatenate([before, behind, here])
+        of_factor = np.concatenate([kinds_before, kinds_behind, triples[:, 0]])
         chosen = found[order]
         return cls(factors[chosen], of_factor[chosen], np.argsort(order)[number])

@@ -270,19 +270,8 @@ class UnitResponses:
         begin = places.begin[owned] + self._ownership.first - first
         low, high = (numbering.starts[station[owned]] for station in (places.first, places.last))
         width, to = places.width[owned], at[places.width[chosen] > 0]
-        cuts = Cuts(low - first, high - first, begin, width, to)
+        cuts = native.Cuts(low - first, high - first, begin, width, to)
         return float(native.cut_out(answers, cuts, data))
-
-
-class Cuts(NamedTuple):
-    """Windows of the answers of n places among unknowns of a stretch, (n,) each: an answer should
-    vanish before ``low`` and from ``high`` on; ``width`` values from ``begin`` on go to ``at``."""
-
-    low: np.ndarray
-    high: np.ndarray
-    begin: np.ndarray
-    width: np.ndarray
-    at: np.ndarray
 
 
 class Places(NamedTuple):

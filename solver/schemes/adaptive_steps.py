@@ -26,12 +26,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.solver.kernels import native
 from catenary.solver.problem.problem import Numerics, n_halvings
 from catenary.solver.schemes.fixed_point import FixedPoint
 from catenary.solver.schemes.make_scheme import Parts
@@ -42,40 +41,14 @@ from catenary.solver.schemes.scheme import Counters, Decision, Scheme, StepRejec
 _PAST = 3
 
 
-class Past(NamedTuple):
-    """The latest steps, oldest first.
-
-    Attributes
-    ----------
-    times : (3,) their ends [s]
-    depths : (3, n) of n contacts [m]
-    forces : (n,) at the end of the last [N]
-    """
-
-    times: np.ndarray
-    depths: np.ndarray
-    forces: np.ndarray
-
-
-class Tried(NamedTuple):
-    """Results of a tentative step at n contacts, (n,) each; see ``StepError.of``."""
-
-    depth: np.ndarray
-    force: np.ndarray
-    stiffness: np.ndarray
-    compliance: np.ndarray
-
-
 class StepError:
     """The estimate for n contacts, with the depths that it remembers. On rank 0; not collective."""
 
     def __init__(self, n: int) -> None:
-        self._past = Past(np.zeros(_PAST), np.zeros((_PAST, n)), np.zeros(n))
+        # Ends of the latest steps [s] and depths there [m], oldest first; forces at the last [N].
+        self._times, self._depths = [0.0] * _PAST, [[0.0] * n] * _PAST
+        self._forces = [0.0] * n
         self._known = 0
-        self._tried = Tried(*np.zeros((4, n)))
-        arguments = self._tried, self._past
-        self._largest = native.step_error.bound(*arguments)
-        self._remember = native.accept_step.bound(*arguments)
 
     def of(
         self,
@@ -98,30 +71,37 @@ class StepError:
         """
         if self._known < _PAST:
             return None
-        given = depth, force, stiffness, compliance
-        for array, values in zip(self._tried, given, strict=True):
-            array[:] = values
-        return float(self._largest(time))
+        t0, t1, t2 = self._times
+        largest, step = 0.0, time - t2
+        given = (values.tolist() for values in (depth, force, stiffness, compliance))
+        for d0, d1, d2, before, d, now, k, by in zip(
+            *self._depths, self._forces, *given, strict=True
+        ):
+            if before > 0.0 or now > 0.0:
+                rates = (d - d2) / step, (d2 - d1) / (t2 - t1), (d1 - d0) / (t1 - t0)
+                change = (rates[0] - rates[1]) / (time - t1) - (rates[1] - rates[2]) / (t2 - t0)
+                largest = max(largest, k * (step * step / 6.0 * abs(change)))
+            if (before > 0.0) != (now > 0.0):
+                largest = max(largest, math.sqrt(k * by) * max(before, now))
+        return largest
 
     def accept(self, time: float, depth: np.ndarray, force: np.ndarray) -> None:
         """Store an accepted step to ``time`` [s]: depths [m] and forces [N] (n,) at its end."""
-        self._tried.depth[:], self._tried.force[:] = depth, force
-        self._remember(time)
+        self._times = [*self._times[1:], time]
+        self._depths = [*self._depths[1:], depth.tolist()]
+        self._forces = force.tolist()
         self._known = min(self._known + 1, _PAST)
 
     def state(self) -> np.ndarray:
         """Memory of the estimate, as one array of fixed length."""
-        times, depths, forces = self._past
-        return np.concatenate([[self._known], forces, times, depths.ravel()], dtype=float)
+        return np.array([self._known, *self._forces, *self._times, *np.ravel(self._depths)])
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
-        times, depths, forces = self._past
-        n = forces.size
+        n = len(self._forces)
         self._known = int(state[0])
-        forces[:] = state[1 : 1 + n]
-        times[:] = state[1 + n : 1 + n + _PAST]
-        depths[:] = state[1 + n + _PAST :].reshape(depths.shape)
+        parts = np.split(state[1:], n + np.array([0, _PAST, _PAST + n, _PAST + 2 * n]))
+        self._forces, self._times, *self._depths = (part.tolist() for part in parts)
 
 
 # A size that is shorter than a level's by less than this share of a halving is taken for it, so

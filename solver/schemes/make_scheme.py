@@ -135,18 +135,21 @@ class SchemeFactory:
         line.open_window(window)
 
 
-def _one_solve(
-    factory: SchemeFactory,
+def one_solve(
+    comm: Any,
     problem: Problem,
     model: Model,
     interaction: ForcesOnLine,
     pantographs: Pantographs,
-) -> Scheme:
+) -> OneSolve:
+    """The scheme ``one_solve``, with the coupling that the problem's numerics ask for. Collective.
+
+    Parameters are those of ``SchemeFactory.make`` and what it makes.
+    """
     links = interaction.link_coupling
     coupled = no_links() if links is None else links.coupled
     law = law_in_steps(problem, model.simulated, pantographs.n_contacts)
-    coupling = make_coupling(law, coupled, problem.numerics)
-    return OneSolve(factory.comm, interaction, pantographs, coupling)
+    return OneSolve(comm, interaction, pantographs, make_coupling(law, coupled, problem.numerics))
 
 
 def _fixed_point(
@@ -164,6 +167,6 @@ def _fixed_point(
 
 # Makers of schemes by ``Numerics.scheme``.
 SCHEMES: dict[str, Callable[[SchemeFactory, Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
-    "one_solve": _one_solve,
+    "one_solve": lambda factory, *made: one_solve(factory.comm, *made),
     "fixed_point": _fixed_point,
 }

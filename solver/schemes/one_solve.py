@@ -12,11 +12,12 @@ from catenary.base.parallel import on_root
 from catenary.base.petsc import EVENTS, event
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import Bounds, LineResponse
+from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.complementarity import NOT_FINITE, InnerSolution
 from catenary.solver.contact_problem.coupling import Coupling
 from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
+from catenary.solver.kernels import native
 from catenary.solver.schemes.scheme import (
     Counters,
     Scheme,
@@ -51,7 +52,7 @@ class OneSolve(Scheme):
     def __post_init__(self) -> None:
         n = self.pantographs.n_contacts
         switches = self.interaction.link_coupling is not None
-        self._bounds = Bounds(
+        self._bounds = native.Bounds(
             np.full(n, _FIRST_BOUND),
             np.full(n, _FIRST_BOUND if self.coupling.law.pulls else 0.0),
             np.full(1, _FIRST_MARGIN if switches else _NO_MARGIN),

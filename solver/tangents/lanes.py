@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.line_state import Motion, PredictedLineState
+from catenary.solver.integrators.line_state import PredictedLineState
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.model.alike import kinds_of
 from catenary.solver.tangents.set_up import Change
@@ -19,28 +18,6 @@ _BITS = 40
 # Pairs of rows that are taken at a time, so that their sums stay near the processor.
 _PAIRS_AT_A_TIME = 64
 _NO_NUMBERS = np.zeros(0, dtype=np.int64)
-
-
-class ChangedRows(NamedTuple):
-    """Changes of matrices by pairs of rows; see `kernels/tangents/tangent_lanes.hpp`."""
-
-    weights: np.ndarray
-    kinds: np.ndarray
-    begin: np.ndarray
-    offsets: np.ndarray
-    values: np.ndarray
-    reach: int
-    room: int
-    sums: np.ndarray
-
-
-class TangentLanes(NamedTuple):
-    """Motions of the line in lanes, and what steps them."""
-
-    passes: native.LanePasses
-    motion: Motion
-    loads: np.ndarray
-    rows: ChangedRows
 
 
 def groups_of(line: LineIntegrator, changes: Sequence[Change]) -> list[list[int]]:
@@ -73,7 +50,7 @@ def groups_of(line: LineIntegrator, changes: Sequence[Change]) -> list[list[int]
 
 def lanes_of(
     line: LineIntegrator, groups: Sequence[Sequence[Change]], starts: Sequence[Sequence[np.ndarray]]
-) -> list[TangentLanes]:
+) -> list[native.TangentLanes]:
     """Motions of groups of tangents at their start. One rank, Newmark's method in two passes.
 
     Parameters
@@ -113,8 +90,8 @@ def _lanes(
     starts: Sequence[np.ndarray],
     n_lanes: int,
     is_loaded: bool,
-    rows: ChangedRows,
-) -> TangentLanes:
+    rows: native.ChangedRows,
+) -> native.TangentLanes:
     """Motions that start with these accelerations."""
     passes, state = line.passes, line.motion
     assert passes is not None and isinstance(state, PredictedLineState)
@@ -128,11 +105,13 @@ def _lanes(
     # Loads in time move the line everywhere, and at once.
     waits = not passes.parts.arrays.loads.size and not any(start.any() for start in starts)
     guard = line.windows.n_stations if waits else 0
-    stepped = native.LanePasses(passes.rows, passes.columns, parts, guard)
-    return TangentLanes(stepped, arrays.motion, arrays.loads, rows)
+    stepped = native.LanePasses(parts, guard)
+    return native.TangentLanes(stepped, arrays.motion, arrays.loads, rows)
 
 
-def _rows(changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray) -> ChangedRows:
+def _rows(
+    changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray
+) -> native.ChangedRows:
     """Changes of matrices over all lanes, with a kind for pairs of rows that are equal.
 
     The largest matrix of each lane is multiplied with the first sums, its next with the second
@@ -174,7 +153,7 @@ def _rows(changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray) -
     of_pairs[pair, np.arange(pair.size) - ends[pair]] = kinds_of(of_entries)[1]
     first, kinds = kinds_of(of_pairs)
     which = np.isin(pair, first)
-    return ChangedRows(
+    return native.ChangedRows(
         weights.reshape(-1, 3 * n_lanes),
         kinds,
         begin=np.cumsum([0, *counts[first]], dtype=np.int64),

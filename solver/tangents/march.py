@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,75 +19,15 @@ from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.model.partition import Ownership
-from catenary.solver.model.switching_links import LinkArrays
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.statics.changed_line.after_incidents import divided_by_mass
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.tangents.lanes import TangentLanes, groups_of, lanes_of
+from catenary.solver.tangents.lanes import groups_of, lanes_of
 from catenary.solver.tangents.set_up import Change, set_up_of
-from catenary.solver.time_loop.compiled_steps import Block, CompiledSteps, StepParts
+from catenary.solver.time_loop.compiled_steps import CompiledSteps
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.prepared_line import make_room
 from catenary.solver.time_loop.views.step_views import Showing
-
-
-class LinkChange(NamedTuple):
-    """Derivatives of links; see `kernels/tangents/tangents.hpp`, as for the next four."""
-
-    law: np.ndarray
-    weights: np.ndarray
-
-
-class HeadChange(NamedTuple):
-    """Derivatives of a head; ``state`` goes on with the steps."""
-
-    matrix: np.ndarray
-    by_drive: np.ndarray
-    by_head: np.ndarray
-    inverse: np.ndarray
-    state: np.ndarray
-    beside: Sequence[native.Head]
-    step: float
-
-
-class LawChange(NamedTuple):
-    """Derivatives of the contact law; ``speed`` and ``latest`` go on with the steps."""
-
-    tangents: np.ndarray
-    hertz: np.ndarray
-    speed: np.ndarray
-    latest: np.ndarray
-
-
-class Tangent(NamedTuple):
-    """A march differentiated by one parameter."""
-
-    rest: np.ndarray
-    links: LinkChange
-    heads: Sequence[HeadChange]
-    drives: np.ndarray
-    law: LawChange
-    start: np.ndarray
-    speed: float
-    results: np.ndarray
-
-
-class TangentGroup(NamedTuple):
-    """Tangents whose motions of the line stand side by side."""
-
-    lanes: TangentLanes
-    tangents: Sequence[Tangent]
-
-
-class MarchTangents(NamedTuple):
-    """All tangents of a march; ``switches`` (3,) counts steps in which a contact was open, in which
-    contacts opened or closed, and in which links switched."""
-
-    groups: Sequence[TangentGroup]
-    pairs: Sequence[Sequence[native.Head]]
-    links: LinkArrays
-    first: np.ndarray
-    switches: np.ndarray
 
 
 class TangentSteps(CompiledSteps):
@@ -98,7 +38,7 @@ class TangentSteps(CompiledSteps):
     results : (most, n_changes, 2 n_pantographs + n_arms) derivatives after the steps of the latest
         block of contact forces [N], uplifts [m] and heights of heads [m], per unit of each
         parameter
-    switches : as in ``MarchTangents``
+    switches : as in `MarchTangents` of `kernels/tangents/tangents.hpp`
 
     Parameters
     ----------
@@ -130,9 +70,11 @@ class TangentSteps(CompiledSteps):
             [[changes[k] for k in group] for group in groups],
             [[starts[k] for k in group] for group in groups],
         )
-        self._tangents = MarchTangents(
+        self._tangents = native.MarchTangents(
             [
-                TangentGroup(own, [_tangent(changes[k], n, self._by_tangent[k]) for k in group])
+                native.TangentGroup(
+                    own, [_tangent(changes[k], n, self._by_tangent[k]) for k in group]
+                )
                 for own, group in zip(lanes, groups, strict=True)
             ],
             [
@@ -163,25 +105,25 @@ class TangentSteps(CompiledSteps):
             "the forces of a step are not found by the compiled loop, which its derivatives need"
         )
 
-    def _made(self, parts: StepParts, block: Block) -> Any:
+    def _made(self, parts: native.StepParts, block: native.Block) -> Any:
         return native.TangentSteps(parts, block, self._tangents)
 
 
-def _tangent(change: Change, n: int, results: np.ndarray) -> Tangent:
+def _tangent(change: Change, n: int, results: np.ndarray) -> native.Tangent:
     """A tangent at the start of a march with n contacts."""
     # Derivatives of the speeds of impact that a Hertzian law starts with [m/s].
     least_speeds = np.full(n, change.hertz[3] if change.hertz.size else 0.0)
-    return Tangent(
+    return native.Tangent(
         change.rest,
-        LinkChange(change.links, change.weights),
+        native.LinkChange(change.links, change.weights),
         [
-            HeadChange(
+            native.HeadChange(
                 *head.arrays, state.copy(), [model.stepped for model in head.beside], head.step
             )
             for head, state in zip(change.heads, change.states, strict=True)
         ],
         change.drives,
-        LawChange(change.law, change.hertz, least_speeds, np.zeros(n)),
+        native.LawChange(change.law, change.hertz, least_speeds, np.zeros(n)),
         change.start,
         change.speed,
         results,

@@ -7,25 +7,20 @@ is no number, is finished by the scheme itself, from where the loop has left it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from catenary.base.petsc import event
 from catenary.mbs.head.head_arrays import drive_width
-from catenary.solver.contact.contacts import Contacts
 from catenary.solver.contact.line_response import affine
-from catenary.solver.contact.pantographs import Pantographs, TrainPlaces
-from catenary.solver.contact_problem.complementarity import SmallProblem
 from catenary.solver.contact_problem.coupling import Implicit
-from catenary.solver.contact_problem.law_tangents import StepLaw
-from catenary.solver.integrators.line_loads import LoadArguments
 from catenary.solver.kernels import native
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.time_loop.views.observer_list import ObserverList
 from catenary.solver.time_loop.views.observers import StepView
-from catenary.solver.time_loop.views.step_views import Showing, Shown
+from catenary.solver.time_loop.views.step_views import Showing
 from catenary.solver.window.moving_columns import MovedStations
 from catenary.solver.window.moving_window import MOST_STEPS
 
@@ -36,63 +31,6 @@ _ROWS_OF_PART = 64
 # The same of motions that are kept. A step of a line of which not one fits takes far longer than
 # the end of a block.
 _MOTION_BYTES, _MOST_MOTIONS = 2**21, 16
-
-
-class KeptMotions(NamedTuple):
-    """Motions that are kept of steps before the last of a block, see ``ShownMotion``.
-
-    Attributes
-    ----------
-    motion_of : (n,) number of the motion kept of each step, -1 if none is
-    numbers : (m,) room for displacements and velocities, one motion after another
-    stations : (k, 3) for each motion the first station kept, the one after the last, and the index
-        of its first entry in ``numbers``
-    used : (1,) used entries of ``numbers``
-    moved : ``ShownMotion.moved``
-    places : places of the pantographs' masses, which are kept with a motion
-    kept_places : (k, l) room for these
-    """
-
-    motion_of: np.ndarray
-    numbers: np.ndarray
-    stations: np.ndarray
-    used: np.ndarray
-    moved: np.ndarray
-    places: Sequence[np.ndarray]
-    kept_places: np.ndarray
-
-
-class StepParts(NamedTuple):
-    """Arguments of native steps; see `kernels/steps/steps.hpp`. ``free`` is None where others take
-    free steps."""
-
-    speed: float
-    train: TrainPlaces
-    contacts: Contacts
-    free: native.TwoPasses | None
-    loads: Sequence[LoadArguments]
-    heads: Sequence[native.Head]
-    strips: np.ndarray
-    problem: SmallProblem
-    law: StepLaw
-    lateral_place: np.ndarray
-    switched: np.ndarray
-    train_outputs: Pantographs
-    outputs: np.ndarray
-    shown: Shown
-    channels: Sequence[np.ndarray]
-
-
-class Block(NamedTuple):
-    """Inputs and outputs of a block of steps; see `kernels/steps/steps.hpp`."""
-
-    times: np.ndarray
-    drives: np.ndarray
-    rows: np.ndarray
-    now: np.ndarray
-    behind: np.ndarray
-    kept: KeptMotions
-    counts: np.ndarray
 
 
 class CompiledSteps:
@@ -134,7 +72,7 @@ class CompiledSteps:
         # Places of the pantographs' masses, which are kept with a motion.
         self._heads, places = pantographs.heads_in_loop()
         room = min(n_numbers * self.most_motions, _MOTION_BYTES // 8)
-        self._kept = KeptMotions(
+        self._kept = native.KeptMotions(
             motion_of=np.full(self.most, -1),
             numbers=np.zeros(room),
             stations=np.zeros((self.most_motions, 3), dtype=np.int64),
@@ -143,14 +81,10 @@ class CompiledSteps:
             places=places,
             kept_places=np.zeros((self.most_motions, sum(array.size for array in places))),
         )
-        n, passes = pantographs.n_contacts, interaction.line.passes
-        assert passes is not None
-        self._free = passes.native
+        assert interaction.line.passes is not None
+        self._free = interaction.line.passes.native
         loads = interaction.line.loads
         self._loads = loads if loads is not None and loads.changes else None
-        self._law = scheme.coupling.law.in_loop()
-        self._strips = np.zeros(2 * n * (1 + n))
-        self._at_contacts = affine(self._strips, n)
         self._drives = np.zeros((self.most, pantographs.n, drive_width(pantographs.most_contacts)))
         self._counts = np.zeros(1, dtype=native.COUNTS)
         self._made_of: tuple[Any, Any] = None, None
@@ -251,18 +185,13 @@ class CompiledSteps:
 
     def _keep_motion(self, number: int) -> bool:
         """Keep the motion of a step as motion ``number``, unless negative; False without room."""
-        kept, motion = self._kept, self._showing.motion
+        kept = self._kept
         if number < 0:
             return True
-        columns, line = self._showing.shown.columns, self.scheme.interaction.line
-        own, first = slice(*columns.starts[kept.moved].tolist()), int(kept.used[0])
-        last = first + 2 * (own.stop - own.start)
-        if last > kept.numbers.size:
+        shown = self._showing.shown
+        if not native.keep(kept, number, shown.motion, shown.columns):
             return False
-        kept.numbers[first:last] = np.append(line.displacement[own], line.velocity[own])
-        kept.stations[number] = *motion.moved, first
-        kept.used[0] = last
-        motion.moved[:] = columns.ends[:2]
+        # Heads that kernels call have not told them where they are now.
         kept.kept_places[number] = np.concatenate(self.scheme.pantographs.places())
         return True
 
@@ -294,9 +223,16 @@ class CompiledSteps:
         # A step may exchange these arrays for larger ones.
         if self._made_of[0] is not share or self._made_of[1] is not unknowns:
             self._made_of = share, unknowns
-            problem = coupling.inner.problem(self._at_contacts, share)
-            moved = self._moved
-            block = Block(
+            moved, showing = self._moved, self._showing
+            parts = step_parts(
+                self.scheme,
+                self._heads,
+                free=self._free,
+                loads=[] if self._loads is None else [self._loads.arguments],
+                shown=showing.shown,
+                channels=showing.layout.copied,
+            )
+            block = native.Block(
                 times=self.times,
                 drives=self._drives,
                 rows=self.rows,
@@ -305,32 +241,46 @@ class CompiledSteps:
                 kept=self._kept,
                 counts=self._counts,
             )
-            self._steps = self._made(self._parts(problem), block)
+            self._steps = self._made(parts, block)
         return self._steps
 
-    def _made(self, parts: StepParts, block: Block) -> Any:
+    def _made(self, parts: native.StepParts, block: native.Block) -> Any:
         """Native steps of these parts."""
         return native.Steps(parts, block)
 
-    def _parts(self, problem: SmallProblem) -> StepParts:
-        pantographs, interaction = self.scheme.pantographs, self.scheme.interaction
-        return StepParts(
-            speed=float(pantographs.speed),
-            train=pantographs.places_along,
-            contacts=interaction.contacts,
-            free=self._free,
-            loads=[] if self._loads is None else [self._loads.arguments],
-            heads=self._heads,
-            strips=self._strips,
-            problem=problem,
-            law=self._law,
-            lateral_place=pantographs.lateral_place,
-            switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
-            train_outputs=pantographs,
-            outputs=pantographs.outputs,
-            shown=self._showing.shown,
-            channels=self._showing.layout.copied,
-        )
+
+def step_parts(scheme: OneSolve, heads: Sequence[native.Head], **of_line: Any) -> native.StepParts:
+    """Arguments of native steps on the arrays that a scheme has now. Not collective.
+
+    Parameters
+    ----------
+    scheme : OneSolve
+        Scheme whose steps are taken.
+    heads : sequence of native.Head
+        Its pantographs as kernels step them.
+    **of_line
+        What the line adds: ``free`` steps, None where others take these, ``loads``, ``shown`` and
+        ``channels``.
+    """
+    pantographs, coupling = scheme.pantographs, scheme.coupling
+    assert isinstance(coupling, Implicit)
+    n = pantographs.n_contacts
+    strips = np.zeros(2 * n * (1 + n))
+    problem = coupling.inner.problem(affine(strips, n), scheme.share)
+    return native.StepParts(
+        speed=float(pantographs.speed),
+        train=pantographs.places_along,
+        contacts=scheme.interaction.contacts,
+        heads=heads,
+        strips=strips,
+        problem=problem,
+        law=coupling.law.in_loop(),
+        lateral_place=pantographs.lateral_place,
+        switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
+        train_outputs=pantographs,
+        outputs=pantographs.outputs,
+        **of_line,
+    )
 
 
 def compiled_steps(

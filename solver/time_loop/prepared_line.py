@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,17 +21,6 @@ from catenary.solver.time_loop.compiled_steps import CompiledSteps
 
 # Links of a long line that may switch in one step: mostly it is some ten. These take 7 MB.
 _MOST_LINKS = 512
-
-
-class Ahead(NamedTuple):
-    """Inputs of the steps to come; see `kernels/simulation/simulation.hpp`."""
-
-    dt: float
-    n_done: int
-    drives: np.ndarray
-    ties: np.ndarray
-    one_speed: bool
-    longest_way: float
 
 
 def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, int]) -> None:
@@ -73,7 +61,7 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
     drives = np.zeros((last - first, len(models), drive_width(pantographs.most_contacts)))
     pantographs.fill_drives(np.arange(first + 1, last + 1) * dt, drives)
     end = float(scheme.interaction.contacts.wires.nodes["x"].max())
-    ahead = Ahead(
+    ahead = native.Ahead(
         dt,
         first,
         drives,

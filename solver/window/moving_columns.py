@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
+
+from catenary.solver.kernels import native
 
 _ALL = slice(None)
 
 
-class Columns(NamedTuple):
-    """Columns of several tables by the stations that they follow from, as kernels take them.
+class Columns(native.Columns):
+    """Columns of several tables by the stations that they follow from, see ``native.Columns``."""
 
-    Attributes
-    ----------
-    ends : the first station that moves and the one after the last, kept up to date by a window
-    starts : (n + 1,) first unknown of each station
-    first : (n + 1, k) for each of k tables the first column that follows from a station or from one
-        behind it
-    last : (n + 1, k) for each of k tables the column after the last one that follows from stations
-        before a station
-    """
-
-    ends: np.ndarray
-    starts: np.ndarray
-    first: np.ndarray
-    last: np.ndarray
+    __slots__ = ()
 
     @property
     def n_stations(self) -> int:

@@ -4,74 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces, WantedPieces
-from catenary.solver.linear.station_factors import StationFactors, Turning
+from catenary.solver.linear.station_factors import StationFactors
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
 from catenary.solver.window.choice import why_no_window
 
-# Numbers of ``WindowArrays.state``.
+# Numbers of the window's ``state``.
 STEP, IS_FRESH = 0, 1
-
-
-class WindowArrays(NamedTuple):
-    """A window as kernels take it.
-
-    Stations outside are at rest: steps do not read or write them, except those next to the window,
-    which are held in place.
-
-    Attributes
-    ----------
-    state : (2,) int, number of steps taken, and whether the whole line still moves
-    every : steps between two checks of where the window ends
-    guard : number of stations at each end whose motion a check examines
-    by_motion : share of the largest motion below which stations rest, 0 if spans decide
-    spans_behind, spans_ahead : spans of the window behind the last and ahead of the first contact
-    fading : ``WindowChoice.fading`` times the time between two checks [m2]
-    is_exact : whether stations at rest are set to zero, or keep their displacement
-    peak : (2,) largest of x and y of the motion
-    contacts : (n,) places of the contacts [m], by reference
-    loaded : (2,) first and last place with a load [m]
-    margin : distance that a step and links that switch in it reach beyond contacts and loads [m]
-    masts : (k,) ends of the spans [m]
-    low, high : (n,) of stations, see ``Unknowns``
-    starts : (n + 1,) first unknown of each station
-    links_before : (n + 1,) number of links before each station
-    ends, kinds, turning : of ``StationFactors``
-    links : (2,) the first link that may switch and the one after the last
-    ranges : (2, 2) the same for the pass back, see ``StationPasses.track_links``
-    known : accelerations that the motion keeps besides x, y and z, or none
-    """
-
-    state: np.ndarray
-    every: int
-    guard: int
-    by_motion: float
-    spans_behind: float
-    spans_ahead: float
-    fading: float
-    is_exact: bool
-    peak: np.ndarray
-    contacts: np.ndarray
-    loaded: np.ndarray
-    margin: float
-    masts: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    starts: np.ndarray
-    links_before: np.ndarray
-    ends: np.ndarray
-    kinds: np.ndarray
-    turning: Turning
-    links: np.ndarray
-    ranges: np.ndarray
-    known: np.ndarray
 
 
 # Steps from one look to the next.
@@ -89,7 +34,7 @@ class MovingWindow:
 
     Attributes
     ----------
-    arrays : WindowArrays
+    arrays : ``native.Window``
     unknowns : first unknown that moves and the one after the last, as of the latest look
 
     Parameters
@@ -128,7 +73,7 @@ class MovingWindow:
         station = np.searchsorted(starts, links.min(axis=1, initial=starts[-1]), side="right") - 1
         before = np.searchsorted(np.maximum.accumulate(station), np.arange(n + 1))
         moving_links[:] = 0, len(links)
-        self.arrays = WindowArrays(
+        self.arrays = native.Window(
             state=np.array([0, 1], dtype=np.int64),
             every=EVERY,
             guard=max(1, int(np.ceil(reach / spacing))),

@@ -14,21 +14,19 @@ import numpy as np
 import pytest
 from floor import LIBRARIES
 from mpi4py import MPI
-from repeating_line import layout, line
+from repeating_line import layout, line, station_factors, station_product
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.solver.integrators.line_state import PredictedLineState, Steps
+from catenary.solver.integrators.line_state import Newmark, PredictedLineState
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays
-from catenary.solver.linear.station_factors import station_factors
-from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 N_STATIONS, PERIOD = 1126, 45
-STEPS = Steps(1e-3, 2.5e-7, 5e-4, 0.003, 2.5e-7, 5e-4, 0.0)
+STEPS = Newmark(1e-3, 2.5e-7, 5e-4, 0.003, 2.5e-7, 5e-4, 0.0)
 ROUNDS, CALLS = 300, 20
 FLOOR = "floor"
 # Planes of a station, and the most that a step may take in terms of the floor: 1.3 times what it

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from catenary.solver.linear.stations.sections import Sections, neighbours
+from catenary.solver.linear import station_factors as factored
+from catenary.solver.linear.station_factors import StationFactors
+from catenary.solver.linear.stations import station_products as multiplied
+from catenary.solver.linear.stations.sections import Sections, places_of
 from catenary.solver.linear.stations.station_layout import Layout
-from catenary.solver.linear.stations.station_products import layout_of
+from catenary.solver.linear.stations.station_products import StationProduct, layout_of
+from catenary.solver.linear.stations.station_rows import StationRows
 
 # Unknowns of stations, plane by plane, whose loops shipped cases need in any case. Loops of others
 # take some seconds each to compile, and are left to whole studies.
@@ -111,3 +115,94 @@ def holding(matrix: sparse.bsr_matrix, held: np.ndarray) -> sparse.bsr_matrix:
     """A matrix whose unknowns ``held`` (n_stations, width) are joined to nothing."""
     free = sparse.diags((~held.ravel()).astype(float))
     return (free @ matrix @ free + sparse.diags(held.ravel().astype(float))).tobsr(matrix.blocksize)
+
+
+def alike(n: int, width: int) -> Sections:
+    """Stations that have all places."""
+    return Sections(
+        width * np.arange(n + 1), np.zeros(n, dtype=np.int64), (tuple(range(width)),), width
+    )
+
+
+def neighbours(
+    matrix: sparse.bsr_matrix, first: int = 0, columns: Sections | None = None
+) -> np.ndarray | None:
+    """Blocks of each row towards the start of the line, on the diagonal and towards the end.
+
+    Row i has its diagonal block in column ``first`` + i. Shape (3, n, b, b); None if the matrix has
+    blocks further away. ``columns`` are the stations of the columns; a matrix without has one block
+    for each.
+    """
+    if columns is not None and columns.varies:
+        return _of_varying(matrix, first, columns)
+    n, (size, _) = matrix.indptr.size - 1, matrix.blocksize
+    if n == 0:
+        return None
+    row = np.repeat(np.arange(n), np.diff(matrix.indptr))
+    step = matrix.indices - row - first
+    if np.abs(step).max(initial=0) > 1:
+        return None
+    blocks = np.zeros((3, n, size, size))
+    blocks[step + 1, row] = matrix.data
+    return blocks
+
+
+def _of_varying(matrix: sparse.bsr_matrix, first: int, columns: Sections) -> np.ndarray | None:
+    """``neighbours`` of a matrix in blocks of any size."""
+    entries = matrix.tocoo()
+    n = int(np.searchsorted(columns.starts, columns.starts[first] + matrix.shape[0])) - first
+    rows, row_place = places_of(entries.row + columns.starts[first], columns)
+    others, place = places_of(entries.col, columns)
+    rows -= first
+    step = others - rows - first
+    there = entries.data != 0
+    if n == 0 or np.abs(step[there]).max(initial=0) > 1:
+        return None
+    blocks = np.zeros((3, n, columns.width, columns.width))
+    blocks[step[there] + 1, rows[there], row_place[there], place[there]] = entries.data[there]
+    return blocks
+
+
+def rows_of(
+    matrix: sparse.bsr_matrix, first: int = 0, columns: Sections | None = None
+) -> StationRows | None:
+    """Rows of a matrix in sorted blocks, each a kind of its own; ``first`` and ``columns`` as in
+    ``neighbours``."""
+    blocks = neighbours(matrix, first, columns)
+    if blocks is None:
+        return None
+    every = np.arange(blocks.shape[1])
+    return StationRows(every.astype(np.int32), every, blocks)
+
+
+def station_product(
+    matrix: sparse.bsr_matrix,
+    first: int,
+    layout: Layout,
+    damping: sparse.bsr_matrix | None = None,
+    columns: Sections | None = None,
+) -> StationProduct | None:
+    """Products with a matrix in sorted blocks, of stations that are alike if no columns are given;
+    None if they cannot be made."""
+    rows = rows_of(matrix, first, columns)
+    damped = None if damping is None else rows_of(damping, first, columns)
+    if rows is None:
+        return None
+    columns = columns or alike(first + rows.kinds.size + 1, layout.pitch)
+    return multiplied.station_product(rows, first, layout, columns, damped)
+
+
+def station_factors(
+    matrix: sparse.bsr_matrix,
+    layout: Layout,
+    low: int = 0,
+    high: int | None = None,
+    stations: Sections | None = None,
+    turns: bool = False,
+) -> StationFactors | None:
+    """Factors of a matrix in sorted blocks, of stations that are alike if none are given."""
+    rows = rows_of(matrix, 0, stations)
+    if rows is None:
+        return None
+    stations = stations or alike(rows.kinds.size, layout.pitch)
+    return factored.station_factors(rows, layout, stations, low, high, turns)

@@ -204,7 +204,7 @@ echo >"$2"
     assert not compiled()
     (sources / "solver" / "kernels" / "base" / "of_nobody.hpp").write_text("")
     assert not compiled()
-    (sources / "solver" / "kernels" / "base" / "compiler.hpp").touch()
+    (sources / "solver" / "kernels" / "base" / "targets.hpp").touch()
     assert compiled()
 
 

@@ -16,8 +16,9 @@ from catenary.cases.run.planning.plan import make_plan
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.studies import scaling
 from catenary.cases.studies.scaling import as_text
-from catenary.solver.contact.line_response import Bounds, LineResponse
+from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.force_exchange import Exchange
+from catenary.solver.kernels import native
 
 WIRE = Wire(2e-6, 1e-10)
 # 1000 spans of 100 unknowns, 10 ns each, and 20 us whatever the line.
@@ -41,7 +42,7 @@ def test_messages_are_as_long_as_those_of_a_march() -> None:
     for n, more in ((1, ""), (2, ",{name='lumped',behind_m=30}")):
         words = [f"train.pantographs=[{{name='lumped'}}{more}]", "train.start_m=200"]
         sizes = many_ranks.work_of(load_scene("ambrosio2012", words)).sizes
-        bounds = Bounds(*LineResponse(n, 1).bounds)
+        bounds = native.Bounds(*LineResponse(n, 1).bounds)
         exchange = Exchange(MPI.COMM_SELF, n, False, bounds)
         assert sizes.share == exchange.share.summed.nbytes
         assert sizes.reply == exchange._answer.nbytes

@@ -26,9 +26,10 @@ from measuring import matrix_of
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import Coupled, LineResponse
+from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
+from catenary.solver.kernels import native
 from catenary.solver.model.link_directions import swings_of_droppers
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.form_finding.equilibrium import find_form
@@ -58,7 +59,7 @@ class Step:
         band = np.zeros((size, 2 * size - 1))
         for e in range(size):
             band[e, size - 1 - e : 2 * size - 1 - e] = self.coupling[:, e]
-        links = Coupled(
+        links = native.Coupled(
             band, np.ones(size), self.behind == 0, self.behind.astype(np.int64), np.zeros(size)
         )
         # A contact whose wire is not on its strip: loops are those that runs have compiled.

@@ -16,7 +16,7 @@ from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
 from catenary.mbs.head.strips import Strips, Turning
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.pantographs import Pantographs, TrainPlaces, leads_of
+from catenary.solver.contact.pantographs import Pantographs, leads_of
 from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
@@ -76,7 +76,7 @@ def test_contacts_are_where_a_straight_strip_crosses_a_zigzag(rake: float) -> No
     supports = SPAN * np.arange(len(stagger))
     start, places = np.array([5.0, 5.0, 6.0, 5.5]), np.zeros(4)
     for way in np.linspace(0.0, 220.0, 1201):
-        native.move_contacts(TrainPlaces(start, places, leads), way)
+        native.move_contacts(native.TrainPlaces(start, places, leads), way)
         for at in (0, 2):
             middle = start[at] + way
 

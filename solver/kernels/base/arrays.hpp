@@ -1,9 +1,22 @@
 #pragma once
-// Arrays of others, which these do not own: std::span of one dimension, and more below. Bounds are
-// checked where _GLIBCXX_ASSERTIONS is defined, as by `make sanitize`.
+// Arrays of others, which these do not own: std::span of one dimension, and more below; and records
+// of arrays, which Python fills in by the names of their members. Bounds are checked where
+// _GLIBCXX_ASSERTIONS is defined, as by `make sanitize`.
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <tuple>
+#include <type_traits>
+
+/// Names the members of a record, last in it. Python has a named tuple of these.
+#define CATENARY_RECORD(...)                              \
+    static constexpr const char* kMembers = #__VA_ARGS__; \
+    auto members() {                                      \
+        return std::tie(__VA_ARGS__);                     \
+    }
+
+/// Shapes that arrays from Python must have, member by member, in the words of python/shapes.hpp.
+#define CATENARY_SHAPES(shapes) static constexpr const char* kShapes = shapes;
 
 namespace catenary {
 
@@ -13,6 +26,11 @@ struct Array2 {
     T* data = nullptr;
     int64_t rows = 0, columns = 0;
 
+    operator Array2<const T>() const
+        requires(!std::is_const_v<T>)
+    {
+        return {data, rows, columns};
+    }
     std::span<T> operator[](int64_t row) const { return all().subspan(row * columns, columns); }
     T& operator()(int64_t row, int64_t column) const { return (*this)[row][column]; }
     std::span<T> all() const { return {data, static_cast<size_t>(rows * columns)}; }
@@ -58,5 +76,11 @@ std::span<T> part(std::span<T> array, int64_t begin, int64_t end) {
         throw std::out_of_range("a part of an array is beyond its numbers");
     return array.subspan(begin, end - begin);
 }
+
+template <class T>
+concept RecordType = requires(T record) {
+    T::kMembers;
+    record.members();
+};
 
 }  // namespace catenary

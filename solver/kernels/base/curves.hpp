@@ -4,7 +4,6 @@
 #include <tuple>
 
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 

@@ -10,4 +10,13 @@ uint64_t flush_subnormals();
 /// Restore the mode before.
 void restore_subnormals(uint64_t before);
 
+/// Flushes them as long as it lives.
+class FlushedSubnormals {
+  public:
+    ~FlushedSubnormals() { restore_subnormals(before_); }
+
+  private:
+    uint64_t before_ = flush_subnormals();
+};
+
 }  // namespace catenary

@@ -1,8 +1,7 @@
 #pragma once
 // Contacts of a rank's part of a line: their places, and answers to forces there (influence
 // functions, columns of A^-1).
-#include "base/record.hpp"
-#include "contact/across.hpp"
+#include "base/arrays.hpp"
 #include "contact/touch.hpp"
 #include "motion/links.hpp"
 

@@ -1,8 +1,7 @@
 #pragma once
 // Places of contacts along the track, and outputs of pantographs and strips.
 #include "base/arrays.hpp"
-#include "base/record.hpp"
-#include "contact/affine.hpp"
+#include "contact/touch.hpp"
 
 namespace catenary {
 

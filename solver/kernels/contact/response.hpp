@@ -1,6 +1,5 @@
 #pragma once
 // A rank's share of the small problem of a step: answers of the line to contacts and links.
-#include "contact/affine.hpp"
 #include "contact/contacts.hpp"
 
 namespace catenary {

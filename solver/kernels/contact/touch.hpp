@@ -1,6 +1,6 @@
 #pragma once
-// Places of strips on contact wires.
-#include <cstdint>
+// Places of strips on contact wires, and what is known of the wires and of heads there.
+#include "base/arrays.hpp"
 
 namespace catenary {
 
@@ -41,6 +41,24 @@ struct Touch {
     int64_t sample;      ///< the sample before the place
     double surface[2];   ///< height [m] and slope [-] of the running surface here
     int64_t filled[2];  ///< first and one after the last local unknown that answers to a force here
+};
+
+/// Lateral motion of wires at n contacts: place y + v [m], its total rate
+/// dv/dt + V (dy/dx + dv/dx) [m/s] and displacement v [m]. Empty without lateral motion.
+struct Across {
+    std::span<double> place, rate, moved;
+    CATENARY_RECORD(place, rate, moved)
+    CATENARY_SHAPES("n, n, n")
+};
+
+/// Heights and their rates at n contacts: `place` (n,) [m] and `rate` (n,) [m/s] without forces,
+/// `by_force` (n, n) [m/N] and `rate_by_force` (n, n) [m/(N s)]: their increase by forces
+/// for a line, their decrease for heads and depths.
+struct Affine {
+    std::span<double> place, rate;
+    Array2<double> by_force, rate_by_force;
+    CATENARY_RECORD(place, rate, by_force, rate_by_force)
+    CATENARY_SHAPES("n, n, n n, n n")
 };
 
 }  // namespace catenary

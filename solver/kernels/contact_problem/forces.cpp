@@ -20,35 +20,8 @@ constexpr double kKnown = 5e-15;
 constexpr int64_t kUsualTangents = 12;
 constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
 
-/// Solve for a law by Newton's method; rounds that are not positive if it does not come to an end.
-Solved solve_by_tangents(const SmallProblem& problem, const MarchedHertzLaw& law) {
-    const auto& [depth, rate] = problem.found;
-    const Affine& gap = problem.gap;
-    const auto force = problem.unknowns.solution.first(depth.size());
-    Solved solved{};
-    // Without a force heads stand highest: from there Newton's method comes from one side.
-    if (!subtract(problem.heads, problem.share.line, problem.share.present, gap)) return solved;
-    linearise(law, gap.place, gap.rate);
-    int64_t rounds = 0;
-    bool pivoted = false;
-    for (int64_t number = 0; number < kMostTangents; ++number) {
-        solved = solve(problem);
-        if (solved.rounds <= 0 || !solved.finite) return solved;
-        rounds += solved.rounds;
-        pivoted = pivoted || solved.pivoted;
-        linearise(law, depth, rate);
-        const auto compensation = part(problem.unknowns.solution, size(depth), solved.size);
-        if (agrees(gap, problem.share.rows, force, compensation, law, number)) {
-            solved.rounds = rounds;
-            solved.pivoted = pivoted;
-            return solved;
-        }
-    }
-    return {};
-}
-
-}  // namespace
-
+/// Whether contact forces and compensations that were found with tangents agree with the law, which
+/// was linearised under them since; `number` tangents did not do before.
 bool agrees(const Affine& gap, const LinkRows& rows, std::span<const double> force,
             std::span<const double> compensation, const MarchedHertzLaw& law, int64_t number) {
     const int64_t n = size(force);
@@ -75,13 +48,43 @@ bool agrees(const Affine& gap, const LinkRows& rows, std::span<const double> for
     return true;
 }
 
+}  // namespace
+
+Solved solve(const SmallProblem& problem, const std::optional<MarchedHertzLaw>& marched) {
+    if (!marched) return solve(problem);
+    const MarchedHertzLaw& law = *marched;
+    const auto& [depth, rate] = problem.found;
+    const Affine& gap = problem.gap;
+    const auto force = problem.unknowns.solution.first(depth.size());
+    Solved solved{};
+    // Without a force heads stand highest: from there Newton's method comes from one side.
+    if (!subtract(problem.heads, problem.share.line, problem.share.present, gap)) return solved;
+    linearise(law, gap.place, gap.rate);
+    int64_t rounds = 0;
+    bool pivoted = false;
+    for (int64_t number = 0; number < kMostTangents; ++number) {
+        solved = solve(problem);
+        if (solved.rounds <= 0 || !solved.finite) return solved;
+        rounds += solved.rounds;
+        pivoted = pivoted || solved.pivoted;
+        linearise(law, depth, rate);
+        const auto compensation = part(problem.unknowns.solution, size(depth), solved.size);
+        if (agrees(gap, problem.share.rows, force, compensation, law, number)) {
+            solved.rounds = rounds;
+            solved.pivoted = pivoted;
+            return solved;
+        }
+    }
+    return {0, 0, true, false, false};
+}
+
 int64_t find_forces(double time, const SmallProblem& problem, const StepLaw& law,
                     std::span<int64_t> switched, Counts& counts) {
     const Flags& flags = problem.share.flags[0];
     const auto solution = problem.unknowns.solution;
     const int64_t n = size(problem.gap.place);
     if (flags.broken != 0.0 || flags.missing != 0.0) return kLeft;
-    const Solved solved = law.marched ? solve_by_tangents(problem, *law.marched) : solve(problem);
+    const Solved solved = solve(problem, law.marched);
     if (solved.rounds <= 0 || !solved.finite) return kLeft;
     if (!solved.complete) return kTooSmall;
     if (!report(time, solution.first(n), law.reported)) return kLeft;

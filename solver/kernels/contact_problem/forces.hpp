@@ -21,11 +21,6 @@ inline constexpr int64_t kLeft = -1, kTooSmall = -2;
 /// Tangents of a step at most: Newton's method on a law doubles its digits with each.
 inline constexpr int64_t kMostTangents = 50;
 
-/// Whether contact forces and compensations that were found with tangents agree with the law, which
-/// was linearised under them since; `number` tangents did not do before.
-bool agrees(const Affine& gap, const LinkRows& rows, std::span<const double> force,
-            std::span<const double> compensation, const MarchedHertzLaw& law, int64_t number);
-
 /// The contact law and its reported forces.
 struct StepLaw {
     std::optional<MarchedHertzLaw> marched;  ///< the law, unless it is linear
@@ -33,6 +28,10 @@ struct StepLaw {
     CATENARY_RECORD(marched, reported)
     CATENARY_SHAPES("n=n, n=n")
 };
+
+/// Find contact forces and compensations for a law: at once if it is linear, which is none here, or
+/// else by Newton's method; no rounds, but finite, if that takes more than `kMostTangents`.
+Solved solve(const SmallProblem& problem, const std::optional<MarchedHertzLaw>& law);
 
 /// Find contact forces and compensations of the step to `time` [s], into the solution of the
 /// problem; `switched` takes the numbers of the links with a compensation.

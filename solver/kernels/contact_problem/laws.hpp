@@ -1,7 +1,6 @@
 #pragma once
 // Contact laws: tangents, and reported forces.
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 

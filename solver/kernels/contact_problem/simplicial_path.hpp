@@ -11,7 +11,7 @@
 // level 0. It cannot come back there, so it arrives at level 1 where the map points away from a
 // point on a large sphere around it. Finer grids from there on, each with a path of its own, leave
 // a zero as exact as wanted.
-#include "contact_problem/room.hpp"
+#include "contact_problem/active_set.hpp"
 
 namespace catenary {
 

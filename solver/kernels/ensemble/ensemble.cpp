@@ -8,17 +8,25 @@
 
 namespace catenary {
 
-void Ensemble::begin(int64_t lane, Steps& steps, int64_t n) {
-    if (n < 0 || n > steps.n_steps()) throw std::out_of_range("a block has not as many steps");
-    marches_.at(lane) = {&steps, 0, n, false};
+Ensemble::Ensemble(std::shared_ptr<ScenePasses> passes, LineExtremes extremes)
+    : passes_(std::move(passes)), extremes_(std::move(extremes)) {
+    if (!passes_) throw std::invalid_argument("an ensemble has no passes");
+    passes_->make_room(extremes_.droppers.law.size());
+    marches_.resize(passes_->n());
+    none_.resize(passes_->n());
+}
+
+void Ensemble::begin(int64_t lane, std::shared_ptr<Steps> steps, int64_t n) {
+    if (n < 0 || n > steps->n_steps()) throw std::out_of_range("a block has not as many steps");
+    marches_.at(lane) = {std::move(steps), 0, n, false};
 }
 
 void Ensemble::take(int64_t most) {
-    const uint64_t before = flush_subnormals();
+    const FlushedSubnormals flushed;
     for (int64_t k = 0; k < most; ++k) {
         for (March& march : marches_)
             if (goes_on(march)) march.steps->set_off(march.next);
-        passes_.step();
+        passes_->step();
         bool all_go_on = true;
         for (size_t lane = 0; lane < marches_.size(); ++lane) {
             March& march = marches_[lane];
@@ -28,10 +36,9 @@ void Ensemble::take(int64_t most) {
             if (!march.is_left) march.steps->show(march.next++);
             all_go_on &= goes_on(march);
         }
-        passes_.take(extremes_, none_);
+        passes_->take(extremes_, none_);
         if (!all_go_on) break;
     }
-    restore_subnormals(before);
 }
 
 }  // namespace catenary

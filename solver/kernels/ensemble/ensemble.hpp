@@ -7,23 +7,18 @@ namespace catenary {
 
 /// A scene on its way: its steps, the next of its block and the end of it.
 struct March {
-    Steps* steps = nullptr;  ///< none where no scene is
+    std::shared_ptr<Steps> steps;  ///< none where no scene is
     int64_t next = 0, end = 0;
     bool is_left = false;  ///< whether the forces of a step were not found; it stays then
 };
 
 class Ensemble {
   public:
-    /// `passes` are kept by reference.
-    Ensemble(ScenePasses& passes, LineExtremes extremes)
-        : passes_(passes), extremes_(std::move(extremes)) {
-        passes_.make_room(extremes_.droppers.law.size());
-        marches_.resize(passes_.n());
-        none_.resize(passes_.n());
-    }
+    Ensemble(std::shared_ptr<ScenePasses> passes, LineExtremes extremes);
+    virtual ~Ensemble() = default;
 
     /// Begin a scene in a lane, whose line is at rest, with n steps of its block.
-    void begin(int64_t lane, Steps& steps, int64_t n);
+    void begin(int64_t lane, std::shared_ptr<Steps> steps, int64_t n);
     /// Take steps until a scene is at its end, or left, or until so many were taken.
     void take(int64_t most);
     const March& at(int64_t lane) const { return marches_.at(lane); }
@@ -33,7 +28,7 @@ class Ensemble {
         return march.steps && !march.is_left && march.next < march.end;
     }
 
-    ScenePasses& passes_;
+    std::shared_ptr<ScenePasses> passes_;
     LineExtremes extremes_;
     std::vector<March> marches_;  ///< in all lanes
     std::vector<double> none_;    ///< of each lane 0 if it goes on, else infinite

@@ -146,6 +146,7 @@ void ScenePasses::take(const LineExtremes& extremes, std::span<const double> non
 }
 
 void ScenePasses::rest(int64_t scene) const {
+    if (scene < 0 || scene >= n()) throw std::out_of_range("there is no such scene");
     const PassArrays& arrays = parts_.arrays;
     auto clear = [scene, n = n()](std::span<double> numbers) {
         for (int64_t at = scene; at < size(numbers); at += n) numbers[at] = 0.0;

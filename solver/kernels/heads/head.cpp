@@ -85,8 +85,7 @@ void Head::bend_at(std::span<const double> place, std::span<const double> rate) 
 }
 
 void Head::respond(Array2<const double> inverse) {
-    const Array2<const double> touch{arrays_.touch.data, n_strips_, n_};
-    const Array2<const double> moving{touch.data + n_strips_ * n_, n_strips_, n_};
+    const Array2<const double> touch = arrays_.touch[0], moving = arrays_.touch[1];
     const Array2<double> by = by_force();
     for (int64_t j = 0; j < n_strips_; ++j)
         for (int64_t i = 0; i < n_; ++i) {

@@ -9,8 +9,6 @@
 
 #include "base/arrays.hpp"
 #include "base/curves.hpp"
-#include "base/record.hpp"
-#include "contact/across.hpp"
 #include "contact/touch.hpp"
 #include "heads/regulation.hpp"
 
@@ -159,7 +157,7 @@ class Head {
     }
 
     const NewmarkFactors& newmark() const { return arrays_.newmark; }
-    Array2<const double> touch() const { return {arrays_.touch.data, n_strips_, n_}; }
+    Array2<const double> touch() const { return arrays_.touch[0]; }
     std::span<const double> position() const { return state_part(arrays_.state, 0); }
     std::span<const double> velocity() const { return state_part(arrays_.state, 1); }
     std::span<const double> acceleration() const { return state_part(arrays_.state, 2); }

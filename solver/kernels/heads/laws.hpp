@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 #include "heads/head.hpp"
 
 namespace catenary {

@@ -1,7 +1,7 @@
 #pragma once
 // A head over a reduced mechanism, whose height is the last coordinate. See
 // mbs/mechanism/reduced_pantograph.py.
-#include "heads/sprung_head.hpp"
+#include "heads/chains.hpp"
 
 namespace catenary {
 

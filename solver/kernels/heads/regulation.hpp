@@ -1,7 +1,6 @@
 #pragma once
 // A regulated lift: filter, samples, gains, limits, delay. See mbs/control.py.
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 

@@ -1,7 +1,6 @@
 #pragma once
 // Short columns of A^-1 cut out of answers to unit forces. See unit_responses.py.
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 

@@ -2,7 +2,6 @@
 // Sums over the past of a line's ends. See end_memory.py.
 #include "base/arrays.hpp"
 #include "base/complex.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 

@@ -9,9 +9,11 @@ namespace catenary {
 
 /// Columns of several tables by the stations that they follow from; see moving_columns.py.
 struct Columns {
-    std::span<const int64_t> ends;      ///< first station that moves and the one after the last
-    std::span<const int64_t> starts;    ///< (n + 1,) first unknown of each station
-    Array2<const int32_t> first, last;  ///< (n + 1, k)
+    std::span<const int64_t> ends;    ///< first station that moves and the one after the last
+    std::span<const int64_t> starts;  ///< (n + 1,) first unknown of each station
+    /// Of each of k tables (n + 1, k) the first column that follows from a station or from one
+    /// behind it, and the column after the last one that follows from stations before it.
+    Array2<const int32_t> first, last;
     CATENARY_RECORD(ends, starts, first, last)
     CATENARY_SHAPES("2.., n+1, n+1 3, n+1 3")
 };

@@ -1,7 +1,6 @@
 #pragma once
 // The motion of a rank's part of a line, as it is read at single unknowns.
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 
@@ -26,14 +25,18 @@ inline double velocity_at(int64_t unknown, const Motion& motion) {
     return motion.shares[3] * motion.y[at] + motion.shares[4] * motion.z[at];
 }
 
-/// Predictions of Newmark's method (eq. 2.5) in place; `work` becomes -(d +
-/// `work_velocity` v).
+/// Factors of a step of Newmark's method.
 struct Newmark {
-    double dt, predict_position, predict_velocity, work_velocity;
-    double position_factor, velocity_factor, damping_share;
+    double dt;                                  ///< [s]
+    double predict_position, predict_velocity;  ///< of the acceleration before in predictions of
+                                                ///< displacement [s2], velocity [s]
+    double work_velocity;                       ///< c of d + c v, see `Alpha`
+    double position_factor, velocity_factor;    ///< of the acceleration after the step [s2], [s]
+    double damping_share;  ///< of damping on mass that the acceleration lacks [1/s]
     CATENARY_RECORD(dt, predict_position, predict_velocity, work_velocity, position_factor,
                     velocity_factor, damping_share)
 };
+/// Predictions in place (eq. 2.5); `work` becomes -(d + `work_velocity` v).
 void predict(std::span<double> displacement, std::span<double> velocity,
              std::span<const double> acceleration, std::span<double> work, const Newmark& steps);
 /// New displacement and velocity from predictions and acceleration (eq. 2.6). The acceleration
@@ -50,7 +53,7 @@ struct Alpha {
     double known_of_balanced, known_of_own;     ///< shares of b and a before in p
     double position_of_own, position_of_known;  ///< of a before and p in the displacement [s2]
     double velocity_of_own, velocity_of_known;  ///< and in the velocity [s]
-    double damping_on_stiffness;                ///< c of d + c v
+    double damping_on_stiffness;  ///< c, so that K (d + c v) has the forces of damping on K, too
     CATENARY_RECORD(dt, ratio, known_of_balanced, known_of_own, position_of_own, position_of_known,
                     velocity_of_own, velocity_of_known, damping_on_stiffness)
 };

@@ -2,8 +2,8 @@
 // A window of moving stations that follows the train. Stations outside of it are at rest: no step
 // reads or writes them, but for the ones beside it, which are held where they are.
 #include "motion/state.hpp"
+#include "stations/elimination.hpp"
 #include "stations/line.hpp"
-#include "stations/meeting_station.hpp"
 
 namespace catenary {
 

@@ -3,7 +3,6 @@
 #include <array>
 
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 

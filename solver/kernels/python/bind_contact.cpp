@@ -10,8 +10,9 @@ namespace catenary::python {
 
 namespace {
 
-std::tuple<int64_t, int64_t, bool, bool, bool> solve_problem(const SmallProblem& problem) {
-    const Solved solved = solve(problem);
+std::tuple<int64_t, int64_t, bool, bool, bool> solve_problem(
+    const SmallProblem& problem, const std::optional<MarchedHertzLaw>& law) {
+    const Solved solved = solve(problem, law);
     return {solved.rounds, solved.size, solved.finite, solved.complete, solved.pivoted};
 }
 
@@ -45,6 +46,10 @@ bool find_zero_of(const py::function& of, std::span<double> z, double width, dou
 }  // namespace
 
 void offer_contact(py::module_& module) {
+    offer_records<Wires, Answers, Gains, Followed, ContactWork, Sideways, Across, Contacts, Leads,
+                  TrainPlaces, StripEnds, Affine, Bounds, Share>(module);
+    offer_records<Tangents, ReportedForces, StepLaw, Coupled, System, Signs, PathRoom, PivotRoom,
+                  Room, Unknowns, Depths, SmallProblem>(module);
     CATENARY_OFFER_TYPE(module, "NODE", Node, x, y, rest, at, begin, width, local, owned, joined);
     CATENARY_OFFER_TYPE(module, "SAMPLE", Sample, x, height, slope);
     CATENARY_OFFER_TYPE(module, "TOUCH", Touch, first, end, half_length, present, x, element, local,
@@ -70,14 +75,13 @@ void offer_contact(py::module_& module) {
     offer(module, "couple", couple, "w=3n+2, *, *, n, n, *");
     offer(module, "under", under, "n=n, w=3n+2 m=m.., n, m, n=n");
     offer(module, "leaves_out", leaves_out, "n, m, w=3n+2, n=n, *");
-    offer(module, "solve", solve_problem, "");
+    offer(module, "solve", solve_problem, "n=n, n=n");
     offer(module, "find_solution", find_signed, "m=m, m=m, *, k=m..");
     offer(module, "pivot", pivot, "m=m, m=m, k=m..");
     offer(module, "find_zero", find_zero_of, "");
     module.attr("MOST_TANGENTS") = kMostTangents;
     offer(module, "linearise", linearise, "n=n, n, n");
     offer(module, "remember", remember, "n=n, n, n");
-    offer(module, "agrees", agrees, "n=n, w=3n+2, n, m, n=n");
 }
 
 }  // namespace catenary::python

@@ -1,6 +1,4 @@
 // Python bindings of pantographs: heads, and multibody systems.
-#include "heads/sprung_head.hpp"
-#include "heads/linear_chain.hpp"
 #include "heads/raised_head.hpp"
 #include "multibody/joints_and_lines.hpp"
 #include "python/from_python.hpp"
@@ -8,43 +6,6 @@
 namespace catenary::python {
 
 namespace {
-
-/// Owners of a head's arrays.
-struct Keeper {
-    Kept kept;
-};
-
-/// A head that keeps its arrays alive.
-template <class Model>
-class HeldHead : public Model, public Keeper {
-  public:
-    template <class... Parts>
-    explicit HeldHead(Kept&& owners, Parts&&... parts)
-        : Model(std::forward<Parts>(parts)...), Keeper{std::move(owners)} {}
-};
-
-/// Makes a model from records.
-template <class Model, class... Records>
-std::unique_ptr<Model> make(const std::pair<const char*, py::object> (&given)[sizeof...(Records)]) {
-    Kept kept;
-    size_t next = 0;
-    auto convert = [&]<class Record>(std::type_identity<Record>) {
-        const auto& [name, value] = given[next++];
-        return From<Record>::convert(value, name, kept);
-    };
-    std::tuple<Records...> records{convert(std::type_identity<Records>())...};
-    return std::apply(
-        [&](auto&... record) -> std::unique_ptr<Model> {
-            return std::make_unique<HeldHead<Model>>(std::move(kept), record...);
-        },
-        records);
-}
-
-/// A record that a head takes besides, whose arrays it keeps alive.
-template <class Record>
-Record taken(Head& head, const py::object& given, const char* name) {
-    return From<Record>::convert(given, name, dynamic_cast<Keeper&>(head).kept);
-}
 
 /// A head whose steps are calls of Python, with no coordinates of its own.
 class CalledHead : public Head {
@@ -65,15 +26,8 @@ class CalledHead : public Head {
     py::object predict_, advance_;
 };
 
-/// Numbers that a call reads, `n` or more.
-std::span<const double> numbers(const py::object& given, const char* name, int64_t n) {
-    Kept kept;
-    const auto found = From<std::span<const double>>::convert(given, name, kept);
-    if (size(found) < n) throw py::value_error(std::string(name) + " has too few numbers");
-    return found;
-}
 std::span<const double> row(const Head& head, const py::object& drive) {
-    return numbers(drive, "drive", kDrive + 2 * head.n_strips());
+    return numbers<const double>(drive, "drive", kDrive + 2 * head.n_strips());
 }
 
 void extrapolate(Head& head, const py::object& drive, const py::object& early) {
@@ -101,42 +55,25 @@ void offer_heads(py::module_& module) {
     py::class_<Head>(module, "Head")
         .def_property("first", &Head::first, &Head::set_first)
         .def_property("added_force", &Head::added_force, &Head::set_added_force)
-        .def("bend",
-             [](Head& head, const py::object& bending) {
-                 head.bend(taken<Bending>(head, bending, "bending"));
-             })
-        .def("lower",
-             [](Head& head, const py::object& lowering) {
-                 head.lower(taken<Lowering>(head, lowering, "lowering"));
-             })
-        .def("regulate",
-             [](Head& head, const py::object& regulation) {
-                 head.regulate(taken<Regulation>(head, regulation, "regulation"));
-             })
+        .def("bend", taking(&Head::bend, "bending"))
+        .def("lower", taking(&Head::lower, "lowering"))
+        .def("regulate", taking(&Head::regulate, "regulation"))
         .def("step",
              [](Head& head, const py::object& drive) { return head.step(row(head, drive)); })
         .def("advance",
              [](Head& head, const py::object& contact_force) {
-                 head.advance(numbers(contact_force, "contact_force", head.n_strips()));
+                 head.advance(
+                     numbers<const double>(contact_force, "contact_force", head.n_strips()));
              })
         .def("extrapolate", &extrapolate);
     py::class_<LinearChain, Head>(module, "LinearChain")
-        .def(py::init([](const py::object& arrays, const py::object& linear) {
-            return make<LinearChain, HeadArrays, LinearStep>(
-                {{"arrays", arrays}, {"linear", linear}});
-        }));
+        .def(made_of<LinearChain, HeadArrays, LinearStep>("arrays", "linear"));
     py::class_<LawfulChain, Head>(module, "LawfulChain")
-        .def(py::init([](const py::object& arrays, const py::object& masses, const py::object& laws,
-                         const py::object& carrier) {
-            return make<LawfulChain, HeadArrays, SprungMasses, HeadLaws, int64_t>(
-                {{"arrays", arrays}, {"masses", masses}, {"laws", laws}, {"carrier", carrier}});
-        }));
+        .def(made_of<LawfulChain, HeadArrays, SprungMasses, HeadLaws, int64_t>("arrays", "masses",
+                                                                               "laws", "carrier"));
     py::class_<RaisedHead, Head>(module, "RaisedHead")
-        .def(py::init([](const py::object& arrays, const py::object& masses, const py::object& laws,
-                         const py::object& mechanism) {
-            return make<RaisedHead, HeadArrays, SprungMasses, HeadLaws, ReducedMechanism>(
-                {{"arrays", arrays}, {"masses", masses}, {"laws", laws}, {"mechanism", mechanism}});
-        }))
+        .def(made_of<RaisedHead, HeadArrays, SprungMasses, HeadLaws, ReducedMechanism>(
+            "arrays", "masses", "laws", "mechanism"))
         .def_property_readonly("height", &RaisedHead::height);
     py::class_<CalledHead, Head>(module, "CalledHead")
         .def(py::init(
@@ -148,8 +85,8 @@ void offer_heads(py::module_& module) {
                 for (arrays.touch.n = 2;
                      2 * arrays.touch.rows * (1 + arrays.touch.rows) < size(arrays.out);)
                     ++arrays.touch.rows;
-                return std::unique_ptr<CalledHead>(std::make_unique<HeldHead<CalledHead>>(
-                    std::move(kept), arrays, predict, advance));
+                return std::unique_ptr<CalledHead>(
+                    std::make_unique<Held<CalledHead>>(std::move(kept), arrays, predict, advance));
             }));
 
     CATENARY_OFFER_TYPE(module, "BODY_PRODUCT", BodyProduct, body, start, end, between, normal,

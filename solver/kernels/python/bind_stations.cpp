@@ -1,15 +1,10 @@
 // Python bindings of lines whose unknowns stand in stations.
-#include <pybind11/numpy.h>
-#include <pybind11/pybind11.h>
-#include <pybind11/stl.h>
-
 #include <algorithm>
 #include <stdexcept>
 #include <string>
 
 #include "motion/two_passes.hpp"
 #include "python/from_python.hpp"
-#include "python/pass_parts.hpp"
 #include "stations/elimination.hpp"
 #include "stations/known_layouts.hpp"
 #include "stations/records.hpp"
@@ -74,15 +69,6 @@ Line line_of(const Layouts& layouts, const MakeUps& station_types,
     return Line(std::move(kernels), station_types);
 }
 
-/// At least `n` numbers that a call reads or fills.
-template <class T>
-T* numbers(const py::object& given, const char* name, int64_t n) {
-    Kept kept;
-    const auto found = From<std::span<T>>::convert(given, name, kept);
-    if (size(found) < n) throw py::value_error(std::string(name) + " has too few numbers");
-    return found.data();
-}
-
 /// Products with rows of K, and -C.
 class Products {
   public:
@@ -103,9 +89,10 @@ class Products {
     void multiply(int64_t begin, int64_t end, const py::object& factor, const py::object& velocity,
                   const py::object& result) {
         part(rows_.kinds, begin, end);
-        work_.product.factor = numbers<const double>(factor, "factor", line_.n_read());
-        work_.product.velocity = numbers<const double>(velocity, "velocity", line_.n_read());
-        line_.multiply(work_, begin, end, numbers<double>(result, "result", line_.n_solved()));
+        work_.product.factor = numbers<const double>(factor, "factor", line_.n_read()).data();
+        work_.product.velocity = numbers<const double>(velocity, "velocity", line_.n_read()).data();
+        line_.multiply(work_, begin, end,
+                       numbers<double>(result, "result", line_.n_solved()).data());
     }
 
   private:
@@ -126,8 +113,8 @@ class Solves {
         line_.set_runs(work_, size(factors_.kinds), 0);
     }
     void solve(const py::object& right, const py::object& answer) {
-        work_.right = numbers<const double>(right, "right", line_.n_solved());
-        work_.answer = numbers<double>(answer, "answer", line_.n_solved());
+        work_.right = numbers<const double>(right, "right", line_.n_solved()).data();
+        work_.answer = numbers<double>(answer, "answer", line_.n_solved()).data();
         line_.solve(work_, size(factors_.kinds), factors_.at().middle);
     }
 
@@ -136,31 +123,6 @@ class Solves {
     Line line_;
     FactorArrays factors_;
     Work work_;
-};
-
-/// Steps in two passes that keep their arrays alive.
-class HeldPasses : public TwoPasses {
-  public:
-    HeldPasses(PassParts parts, Kept kept) : TwoPasses(std::move(parts)), kept_(std::move(kept)) {}
-    static std::unique_ptr<HeldPasses> made(const Layouts& rows, const Layouts& factors,
-                                            const py::object& parts) {
-        Kept kept;
-        PassParts found = pass_parts(rows, factors, parts, kept);
-        return std::make_unique<HeldPasses>(std::move(found), std::move(kept));
-    }
-    void track(const py::object& tracked) {
-        Kept kept;
-        TwoPasses::track(From<TrackedLinks>::convert(tracked, "links", kept));
-        of_links_ = std::move(kept);
-    }
-    void open(const py::object& window) {
-        Kept kept;
-        TwoPasses::open(From<Window>::convert(window, "window", kept));
-        of_window_ = std::move(kept);
-    }
-
-  private:
-    Kept kept_, of_links_, of_window_;
 };
 
 /// An array of numbers that were made for it.
@@ -185,6 +147,8 @@ py::tuple eliminated(std::span<const int32_t> kinds, const StationBlocks& blocks
 }  // namespace
 
 void offer_stations(py::module_& m) {
+    offer_records<StationBlocks, Sections, Turning, ProductArrays, FactorArrays, PassArrays,
+                  Changes, PassParts, TrackedLinks>(m);
     m.attr("MIDDLES") = kMiddles;
     CATENARY_OFFER_TYPE(m, "MEETING", Meeting, kind, before, after);
     offer(m, "middle_of", middle_of, "");
@@ -212,13 +176,12 @@ void offer_stations(py::module_& m) {
     py::class_<Solves>(m, "Solves")
         .def(py::init<Layouts, MakeUps, py::object>())
         .def("solve", &Solves::solve);
-    py::class_<TwoPasses>(m, "FreeSteps")
+    py::class_<TwoPasses>(m, "TwoPasses")
+        .def(made_of<TwoPasses, PassParts>("parts"))
+        .def("track", taking(&TwoPasses::track, "links"))
+        .def("open", taking(&TwoPasses::open, "window"))
         .def("step", &TwoPasses::step)
         .def("predict_velocities", py::overload_cast<>(&TwoPasses::predict_velocities));
-    py::class_<HeldPasses, TwoPasses>(m, "TwoPasses")
-        .def(py::init(&HeldPasses::made))
-        .def("track", &HeldPasses::track)
-        .def("open", &HeldPasses::open);
     offer(m, "left_behind", left_behind, "s>1, *, l m, r>1 2");
 }
 

@@ -1,6 +1,5 @@
-// Python bindings of steps, their rows and errors, and of lines prepared for steps from outside.
-#include "python/pass_parts.hpp"
-#include "schemes/step_error.hpp"
+// Python bindings of steps and their rows, and of lines prepared for steps from outside.
+#include "python/from_python.hpp"
 #include "simulation/simulation.hpp"
 #include "tangents/tangents.hpp"
 #include "views/extremes.hpp"
@@ -9,63 +8,17 @@ namespace catenary::python {
 
 namespace {
 
-/// Steps that keep their arrays alive.
-class HeldSteps : public Steps {
-  public:
-    HeldSteps(const py::object& parts, const py::object& block, Kept kept = {})
-        : Steps(From<StepParts>::convert(parts, "parts", kept),
-                From<Block>::convert(block, "block", kept)),
-          kept_(std::move(kept)) {}
-
-    /// Write them with the inputs of the steps to come, see `PreparedLine`.
-    void write(const std::string& path, const py::object& ahead) const {
-        Kept kept;
-        const auto given = From<Ahead>::convert(ahead, "ahead", kept);
-        const TwoPasses& free = *parts().free;
-        PreparedLine line{};
-        line.steps = parts();
-        line.passes = free.parts();
-        line.tracked = free.tracked();
-        line.window = free.window();
-        for (const Head* head : parts().heads) line.heads.push_back(parts_of(*head));
-        line.ahead = given;
-        write_line(path, line);
-    }
-
-  private:
-    Kept kept_;
-};
-
-/// Free steps of tangents that keep their arrays alive.
-class HeldLanePasses : public LanePasses {
-  public:
-    HeldLanePasses(PassParts parts, int64_t guard, Kept kept)
-        : LanePasses(std::move(parts), guard), kept_(std::move(kept)) {}
-    static std::unique_ptr<HeldLanePasses> made(const std::vector<Layout>& rows,
-                                                const std::vector<Layout>& factors,
-                                                const py::object& parts, int64_t guard) {
-        Kept kept;
-        PassParts found = pass_parts(rows, factors, parts, kept);
-        return std::make_unique<HeldLanePasses>(std::move(found), guard, std::move(kept));
-    }
-
-  private:
-    Kept kept_;
-};
-
-/// Steps with tangents that keep their arrays alive.
-class HeldTangentSteps : public TangentSteps {
-  public:
-    HeldTangentSteps(const py::object& parts, const py::object& block, const py::object& tangents,
-                     Kept kept = {})
-        : TangentSteps(From<StepParts>::convert(parts, "parts", kept),
-                       From<Block>::convert(block, "block", kept),
-                       From<MarchTangents>::convert(tangents, "tangents", kept)),
-          kept_(std::move(kept)) {}
-
-  private:
-    Kept kept_;
-};
+/// Write steps with the inputs of the ones to come, see `PreparedLine`.
+void write(const Steps& steps, const std::string& path, const py::object& ahead) {
+    Kept kept;
+    const StepParts& parts = steps.parts();
+    if (!parts.free) throw py::value_error("these steps are taken by an ensemble");
+    const TwoPasses& free = *parts.free;
+    PreparedLine line{parts, free.parts(), free.tracked(), free.window(), {}, {}};
+    for (const Head* head : parts.heads) line.heads.push_back(parts_of(*head));
+    line.ahead = From<Ahead>::convert(ahead, "ahead", kept);
+    write_line(path, line);
+}
 
 /// A simulation, with arrays that are views of its numbers.
 class HeldSimulation : public Simulation {
@@ -112,31 +65,24 @@ auto output(std::span<double> TrainOutputs::* which) {
 }  // namespace
 
 void offer_steps(py::module_& module) {
+    offer_records<KeptMotions, StepParts, Block, Ahead>(module);
+    offer_records<ChangedRows, TangentLanes, LinkChange, HeadChange, LawChange, Tangent,
+                  TangentGroup, MarchTangents>(module);
     CATENARY_OFFER_TYPE(module, "COUNTS", Counts, steps, rounds, slack, repeated, pivoted);
     py::class_<Taken>(module, "Taken")
         .def_readonly("begun", &Taken::begun)
         .def_readonly("is_full", &Taken::is_full);
-    py::class_<Steps>(module, "BlockSteps");
-    py::class_<HeldSteps, Steps>(module, "Steps")
-        .def(py::init([](const py::object& parts, const py::object& block) {
-            return std::make_unique<HeldSteps>(parts, block);
-        }))
-        .def("take",
-             [](HeldSteps& steps, int64_t first, int64_t end) { return steps.take(first, end); })
-        .def("write", &HeldSteps::write);
-    py::class_<LanePasses>(module, "LaneSteps")
+    py::class_<Steps, std::shared_ptr<Steps>>(module, "Steps")
+        .def(made_of<Steps, StepParts, Block>("parts", "block"))
+        .def("take", &Steps::take)
+        .def("write", &write);
+    py::class_<LanePasses>(module, "LanePasses")
+        .def(made_of<LanePasses, PassParts, int64_t>("parts", "guard"))
         .def_property_readonly("begin", &LanePasses::begin)
         .def_property_readonly("end", &LanePasses::end);
-    py::class_<HeldLanePasses, LanePasses>(module, "LanePasses")
-        .def(py::init(&HeldLanePasses::made));
-    py::class_<HeldTangentSteps>(module, "TangentSteps")
-        .def(py::init(
-            [](const py::object& parts, const py::object& block, const py::object& tangents) {
-                return std::make_unique<HeldTangentSteps>(parts, block, tangents);
-            }))
-        .def("take", [](HeldTangentSteps& steps, int64_t first, int64_t end) {
-            return steps.take(first, end);
-        });
+    py::class_<TangentSteps>(module, "TangentSteps")
+        .def(made_of<TangentSteps, StepParts, Block, MarchTangents>("parts", "block", "tangents"))
+        .def("take", &TangentSteps::take);
     CATENARY_OFFER_TYPE(module, "TIE", Tie, stiffness, damping);
     PYBIND11_NUMPY_DTYPE(Input, lift_force, head_force, base, base_velocity, base_acceleration);
     py::class_<HeldSimulation>(module, "Simulation")
@@ -155,9 +101,6 @@ void offer_steps(py::module_& module) {
         .def_property_readonly("head_height", output(&TrainOutputs::head_height))
         .def_property_readonly("wire_height", output(&TrainOutputs::wire_height))
         .def_property_readonly("strip_force", output(&TrainOutputs::strip_force));
-
-    offer(module, "step_error", step_error, "n=n, n=n");
-    offer(module, "accept_step", accept_step, "n=n, n=n");
 
     offer(module, "take_extremes", take_extremes, "m k, *, *, *, 2 n");
     offer(module, "take_points", take_points, "m k, *, m, m");

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 #include "python/shapes.hpp"
 
 namespace catenary::python {
@@ -192,6 +191,65 @@ struct From<std::vector<T>> {
 #define CATENARY_OFFER_TYPE(module, name, type, ...) \
     PYBIND11_NUMPY_DTYPE(type, __VA_ARGS__);         \
     module.attr(name) = py::dtype::of<type>()
+
+/// Offer records in a module: named tuples of the members of these structs, which tell what they
+/// are.
+template <RecordType... T>
+void offer_records(py::module_& module) {
+    const py::object make = py::module_::import("collections").attr("namedtuple");
+    auto offer_one = [&](std::string name, const char* members) {
+        name.erase(0, name.rfind(':') + 1);
+        module.attr(name.c_str()) =
+            make(name, members, py::arg("module") = module.attr("__name__"));
+    };
+    (offer_one(py::type_id<T>(), T::kMembers), ...);
+}
+
+/// At least `n` numbers that a call reads or fills.
+template <class T>
+std::span<T> numbers(const py::object& given, const char* name, int64_t n) {
+    Kept kept;
+    const auto found = From<std::span<T>>::convert(given, name, kept);
+    if (size(found) < n) throw py::value_error(std::string(name) + " has too few numbers");
+    return found;
+}
+
+/// What keeps alive the owners of arrays.
+struct Keeper {
+    Kept kept;
+};
+/// An object that keeps alive the arrays that it was made of.
+template <class Model>
+class Held : public Model, public Keeper {
+  public:
+    template <class... Parts>
+    explicit Held(Kept&& owners, Parts&&... parts)
+        : Model(std::forward<Parts>(parts)...), Keeper{std::move(owners)} {}
+};
+
+/// What Python gives for a value of any type.
+template <class>
+using Given = py::object;
+/// Constructor of a class from such parts, whose `names` stand in error messages.
+template <class Model, class... Parts>
+auto made_of(std::convertible_to<const char*> auto... names) {
+    return py::init([=](const Given<Parts>&... given) -> std::unique_ptr<Model> {
+        Kept kept;
+        std::tuple<Parts...> parts{From<Parts>::convert(given, names, kept)...};
+        auto make = [&](auto&... part) -> std::unique_ptr<Model> {
+            return std::make_unique<Held<Model>>(std::move(kept), std::move(part)...);
+        };
+        return std::apply(make, parts);
+    });
+}
+/// A method of a class made so that takes further parts, whose arrays it keeps alive as well.
+template <class Model, class... Parts>
+auto taking(void (Model::*take)(Parts...), std::convertible_to<const char*> auto... names) {
+    return [=](Model& model, const Given<Parts>&... given) {
+        Kept& kept = dynamic_cast<Keeper&>(model).kept;
+        (model.*take)(From<std::decay_t<Parts>>::convert(given, names, kept)...);
+    };
+}
 
 /// A function with some of its arguments.
 class Bound {

@@ -1,8 +1,8 @@
 // The Python module catenary.solver.kernels.native, with the bindings of arithmetic, of curves and
 // of the line: its motion, its loads, and the preparation of a march.
-#include "base/compiler.hpp"
 #include "base/curves.hpp"
 #include "base/flush_to_zero.hpp"
+#include "base/targets.hpp"
 #include "line/condensing.hpp"
 #include "line/gusts.hpp"
 #include "line/short_columns.hpp"
@@ -33,6 +33,8 @@ void offer_base(py::module_& module) {
 }
 
 void offer_line(py::module_& module) {
+    offer_records<Motion, Newmark, Alpha, Columns, Shown, Window, Changing, Sampled, Loads,
+                  MemoryTables, Memories, Cuts>(module);
     CATENARY_OFFER_TYPE(module, "RESERVE", Reserve, rest, stiffness, damping, place, released,
                         carried);
     offer(module, "predict", predict, "n, n, n, n");
@@ -44,7 +46,7 @@ void offer_line(py::module_& module) {
     offer(module, "energy_of_switching", energy_of_switching, "*, n=n, n=n");
     module.attr("LEAST_STATIONS") = kLeastStations;
     offer(module, "turn_to", turn_to, "");
-    offer(module, "take_in", take_in, "2, 2..");
+    offer(module, "keep", keep, "m=m, *, *, *");
     offer(module, "show", show, "a=a d=d, a, d");
 
     CATENARY_OFFER_TYPE(module, "FACTOR", Factor, kind, begin, end, value);

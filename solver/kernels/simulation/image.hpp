@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 

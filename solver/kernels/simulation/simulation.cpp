@@ -113,10 +113,9 @@ void Simulation::make_steps() {
 }
 
 Simulation::Outcome Simulation::step(int64_t n) {
-    const uint64_t before = flush_subnormals();
+    const FlushedSubnormals flushed;
     auto outcome = Outcome::kDone;
     for (int64_t k = 0; k < n && outcome == Outcome::kDone; ++k) outcome = take_one();
-    restore_subnormals(before);
     return outcome;
 }
 

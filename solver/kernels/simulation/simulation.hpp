@@ -7,8 +7,6 @@
 // waits.
 #include <string>
 
-#include "heads/sprung_head.hpp"
-#include "heads/linear_chain.hpp"
 #include "heads/raised_head.hpp"
 #include "simulation/image.hpp"
 #include "steps/steps.hpp"

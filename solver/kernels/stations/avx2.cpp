@@ -1,4 +1,3 @@
-#include "stations/before_target.hpp"
 #include "stations/targets.hpp"
 #ifdef CATENARY_X86_TARGETS
 #pragma GCC target("arch=x86-64-v3")

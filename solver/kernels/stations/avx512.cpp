@@ -1,7 +1,6 @@
 // Vectors of four numbers as for AVX2, in twice as many registers, and products that read the
 // number which they broadcast: wider ones read no less memory. Only eight scenes stand in vectors
 // of eight.
-#include "stations/before_target.hpp"
 #include "stations/targets.hpp"
 #ifdef CATENARY_X86_TARGETS
 #pragma GCC target("arch=x86-64-v4", "prefer-vector-width=256")

@@ -1,4 +1,3 @@
-#include "stations/before_target.hpp"
 #include "stations/targets.hpp"
 #define CATENARY_TARGET baseline
 #ifdef CATENARY_X86_TARGETS
@@ -8,3 +7,14 @@
 #include "stations/scene_blocks.hpp"
 #endif
 #include "stations/target.hpp"
+
+#ifdef CATENARY_X86_TARGETS
+namespace catenary::baseline {
+
+/// None: vectors are too short for it.
+std::unique_ptr<Kernels> make_for_scenes(const Layout&, const Layout&, int) {
+    return nullptr;
+}
+
+}  // namespace catenary::baseline
+#endif

@@ -27,10 +27,6 @@ constexpr int64_t kRoom = 1024;
 using Matrix = Array2<double>;
 using Given = Array2<const double>;
 
-Given read(Matrix matrix) {
-    return {matrix.data, matrix.rows, matrix.columns};
-}
-
 void copy(Given from, Matrix to) {
     std::copy(from.all().begin(), from.all().end(), to.all().begin());
 }
@@ -115,9 +111,9 @@ class Known {
         numbers_.resize(std::max(numbers_.size(), (count + 1) * each()));
         const Matrix pivot = part(count, kInverse);
         copy(blocks.own[kind], pivot);
-        if (last >= 0) condense(before[kind], read(part(last, kCarried)), pivot, row_);
+        if (last >= 0) condense(before[kind], part(last, kCarried), pivot, row_);
         invert_pivot(pivot);
-        carry(read(pivot), onward[kind], part(count, kCarried));
+        carry(pivot, onward[kind], part(count, kCarried));
         const size_t compared = kParts * width_ * width_;
         const double* const own = pivot.data;
         for (int32_t other = latest_[kind]; other >= 0; other = alike_[other])
@@ -169,6 +165,19 @@ void join(std::span<const Meeting> meetings, const StationBlocks& blocks,
             condense(blocks.after[meeting.kind], after[meeting.after][kCarried], pivot, row);
         invert_pivot(pivot);
     }
+}
+
+int64_t middle_of(int64_t low, int64_t high) {
+    return (low + high) / 2 / kMiddles * kMiddles;
+}
+
+void turn(std::span<int32_t> kinds, const Turning& turning, int64_t before, int64_t middle) {
+    part(kinds, std::min(before, middle), std::max(before, middle) + 1);
+    part(turning.to_end, 0, size(kinds));
+    part(turning.here, middle / kMiddles, middle / kMiddles + 1);
+    for (int64_t i = before; i < middle; ++i) kinds[i] = turning.to_end[i];
+    for (int64_t i = middle + 1; i <= before; ++i) kinds[i] = turning.to_start[i];
+    kinds[middle] = turning.here[middle / kMiddles];
 }
 
 }  // namespace catenary

@@ -1,10 +1,9 @@
 #pragma once
-// Block LU factors of a line, station by station, with Schur complements S as pivots. See
-// elimination.py.
+// Block LU factors of a line, station by station, with Schur complements S as pivots; and how the
+// station moves where elimination from both ends meets. See station_factors.py.
 #include <vector>
 
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 
 namespace catenary {
 
@@ -18,7 +17,7 @@ struct StationBlocks {
 
 /// Stations after elimination from one end.
 struct Eliminated {
-    std::vector<double> factors;   ///< (m, 2, b, b), see elimination.py
+    std::vector<double> factors;   ///< (m, 2, b, b), see `Part`
     std::vector<int32_t> kinds;    ///< (m,) kind of station that each factor is of
     std::vector<int32_t> numbers;  ///< (n,) the factor of each station
 };
@@ -36,5 +35,21 @@ struct Meeting {
 /// and `after`.
 void join(std::span<const Meeting> meetings, const StationBlocks& blocks,
           Array4<const double> before, Array4<const double> after, Array4<double> factors);
+
+/// Spacing of the stations where elimination may end, if it may at several.
+constexpr int64_t kMiddles = 16;
+
+/// Kinds of stations by where elimination ends: `to_end` (n,) if that is further on, `to_start`
+/// (n,) if it is before; `here` of each station where it may end, one of kMiddles.
+struct Turning {
+    std::span<const int32_t> to_end, to_start, here;
+    CATENARY_RECORD(to_end, to_start, here)
+    CATENARY_SHAPES("n, n, *")
+};
+
+/// A station where elimination may end, near the middle from `low` to `high`.
+int64_t middle_of(int64_t low, int64_t high);
+/// Move the end of elimination from `before` to `middle`.
+void turn(std::span<int32_t> kinds, const Turning& turning, int64_t before, int64_t middle);
 
 }  // namespace catenary

@@ -6,50 +6,38 @@
 #include "stations/line.hpp"
 #include "stations/targets.hpp"
 
-#define CATENARY_DECLARE(target)                                              \
-    namespace catenary::target {                                              \
-    std::unique_ptr<Kernels> make(const Layout& rows, const Layout& factors); \
-    }
-#define CATENARY_DECLARE_FOR_SCENES(target)                                             \
+#define CATENARY_DECLARE(target)                                                        \
     namespace catenary::target {                                                        \
+    std::unique_ptr<Kernels> make(const Layout& rows, const Layout& factors);           \
     std::unique_ptr<Kernels> make_for_scenes(const Layout& rows, const Layout& factors, \
                                              int scenes);                               \
     }
 CATENARY_DECLARE(baseline)
 #ifdef CATENARY_X86_TARGETS
 CATENARY_DECLARE(avx2)
-CATENARY_DECLARE_FOR_SCENES(avx2)
 CATENARY_DECLARE(avx512)
-CATENARY_DECLARE_FOR_SCENES(avx512)
-#else
-CATENARY_DECLARE_FOR_SCENES(baseline)
 #endif
 
 namespace catenary {
 
 namespace {
 
-using Make = std::unique_ptr<Kernels> (*)(const Layout&, const Layout&);
-using MakeForScenes = std::unique_ptr<Kernels> (*)(const Layout&, const Layout&, int scenes);
 struct Target {
     std::string name;
-    Make make;
-    MakeForScenes make_for_scenes;  ///< null where vectors are too short for it
+    decltype(&baseline::make) make;
+    decltype(&baseline::make_for_scenes) make_for_scenes;
 };
 
 /// Targets that this processor can run, the best last.
 const std::vector<Target>& of_processor() {
     static const std::vector<Target> found = [] {
-        std::vector<Target> targets;
+        std::vector<Target> targets{{"baseline", baseline::make, baseline::make_for_scenes}};
 #ifdef CATENARY_X86_TARGETS
-        targets.push_back({"baseline", baseline::make, nullptr});
         __builtin_cpu_init();
         if (__builtin_cpu_supports("x86-64-v3"))
             targets.push_back({"avx2", avx2::make, avx2::make_for_scenes});
         if (__builtin_cpu_supports("x86-64-v4"))
             targets.push_back({"avx512", avx512::make, avx512::make_for_scenes});
-#else
-        targets.push_back({"baseline", baseline::make, baseline::make_for_scenes});
 #endif
         return targets;
     }();
@@ -84,8 +72,7 @@ std::unique_ptr<Kernels> kernels_of(const Layout& rows, const Layout& factors) {
 }
 
 std::unique_ptr<Kernels> kernels_for_scenes(const Layout& rows, const Layout& factors, int scenes) {
-    const MakeForScenes make = chosen()->make_for_scenes;
-    return make ? make(rows, factors, scenes) : nullptr;
+    return chosen()->make_for_scenes(rows, factors, scenes);
 }
 
 std::unique_ptr<Kernels> kernels_of_rows(const Layout& rows) {

@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "base/record.hpp"
+#include "base/arrays.hpp"
 #include "stations/layout.hpp"
 
 namespace catenary {
@@ -57,10 +57,13 @@ struct Ends {
 
 /// Numbers that take a state from one prediction to the next; see `changes_of`.
 struct Changes {
-    double dt, by_position, by_velocity, damping_share;
-    /// Of the generalized-alpha method: shares of z and of the known acceleration.
+    double dt;                        ///< [s]
+    double by_position, by_velocity;  ///< gains of x [s2] and y [s] by the acceleration of the step
+    double damping_share;             ///< of damping on mass that the acceleration lacks [1/s]
+    /// Of the generalized-alpha method: shares of z and of the known acceleration before a step in
+    /// the known acceleration of the step, in the predicted velocity and in z.
     std::array<double, 2> known, velocity, balance;
-    double by_mass;
+    double by_mass;  ///< unless 0, products are with M, and so much of x is added to the answer
     CATENARY_RECORD(dt, by_position, by_velocity, damping_share, known, velocity, balance, by_mass)
 };
 
@@ -109,6 +112,7 @@ struct Chain {
 /// Kernels of the stations of one type.
 class Kernels {
   public:
+    Kernels(const Layout& r, const Layout& f) : rows(r), factors(f) {}
     virtual ~Kernels() = default;
     /// Rows of a product with K, and -C.
     virtual void multiply(const Work&, const Chain&, double* result) const = 0;
@@ -122,7 +126,7 @@ class Kernels {
     virtual void back(const Work&, Chain&, int step) const = 0;
     virtual void back(const Work&, Chain& to_start, Chain& to_end) const = 0;
 
-    Layout rows, factors;
+    const Layout rows, factors;
 };
 
 /// Kernels of these layouts, compiled for them or general; null if there are more unknowns than

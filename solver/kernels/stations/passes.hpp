@@ -291,10 +291,7 @@ void multiply_rows(const Blocks& blocks, const Work& work, const Chain& chain, d
 template <class Blocks, bool IsForSteps = false>
 class KernelsOf final : public Kernels {
   public:
-    KernelsOf(const Layout& r, const Layout& f) : blocks_(r, f) {
-        rows = r;
-        factors = f;
-    }
+    KernelsOf(const Layout& r, const Layout& f) : Kernels(r, f), blocks_(r, f) {}
     void multiply(const Work& work, const Chain& chain, double* result) const override {
         multiply_rows(blocks_, work, chain, result);
     }
@@ -353,10 +350,7 @@ template <class Blocks, bool IsMixed>
 class QuickKernels final : public Kernels {
   public:
     QuickKernels(const Layout& r, const Layout& f, std::unique_ptr<Kernels> rest)
-        : blocks_(r, f), rest_(std::move(rest)) {
-        rows = r;
-        factors = f;
-    }
+        : Kernels(r, f), blocks_(r, f), rest_(std::move(rest)) {}
     void multiply(const Work& work, const Chain& chain, double* result) const override {
         multiply_rows(blocks_, work, chain, result);
     }

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "base/arrays.hpp"
-#include "base/record.hpp"
 #include "stations/line.hpp"
 
 namespace catenary {

@@ -63,6 +63,7 @@ class Steps {
   public:
     /// Throws std::invalid_argument if parts and block do not agree.
     Steps(StepParts parts, Block block);
+    virtual ~Steps() = default;
     /// Way of the train at a time [s] since time zero [m].
     double way(double time) const { return course_.way + course_.speed * (time - course_.since); }
     const StepParts& parts() const { return parts_; }

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "heads/sprung_head.hpp"
-
 namespace catenary {
 
 namespace {

@@ -2,7 +2,7 @@
 // Derivatives of the heads' steps by parameters of a march.
 #include <vector>
 
-#include "heads/linear_chain.hpp"
+#include "heads/chains.hpp"
 
 namespace catenary {
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from catenary.base.errors import RunBroken
+from catenary.solver.kernels import native
 from catenary.solver.linear.petsc_solvers import DIRECT, wants_own_solver
 from catenary.solver.linear.pieces.pieces import Piece, Pieces, Slots
 from catenary.solver.linear.station_factors import (
     MIDDLES,
     FoundFactors,
     StationFactors,
-    Turning,
     besides_of,
     completed,
     layout_of_factors,
@@ -69,7 +68,7 @@ class FactorPieces:
         besides = np.zeros(n, dtype=np.int32), self._besides.numbers
         kinds = np.zeros(n, dtype=np.int32)
         here = np.zeros(-(-n // MIDDLES), dtype=np.int32)
-        self._turning = Turning(kinds.copy(), kinds.copy(), here)
+        self._turning = native.Turning(kinds.copy(), kinds.copy(), here)
         self.factors = StationFactors(
             layout, stations, kinds, self._blocks.numbers, 0, n, 0, besides, self._turning
         )
@@ -196,10 +195,8 @@ class OperatorPieces:
         return product
 
     def _make(self, piece: Piece) -> None:
-        rows = Stretch(self._model, piece)
-        self.like = rows.like
         sums = [of for _, _, *both in self._products for of in both if of is not None]
-        operator, *found = rows.operator_and(self._coefficients, sums)
+        self.like, (operator, *found) = rows_on(self._model, piece, self._coefficients, *sums)
         self.factors.make(piece, operator)
         part, made = self._stations.station_type[piece.begin : piece.end], iter(found)
         for table, product, _, damping in self._products:
@@ -212,33 +209,19 @@ class OperatorPieces:
             product.kinds[piece.begin : piece.end] = kinds + table.put(piece.slot, numbers)
 
 
-class Stretch:
-    """Rows of matrices on the stretch that a piece is worked out on. Not collective.
-
-    Attributes
-    ----------
-    like : marks of its stations
-    """
-
-    def __init__(self, model: Model, piece: Piece) -> None:
-        starts = model.numbering.starts
-        self._ends = int(starts[piece.low]), int(starts[piece.high])
-        self.like = LikeStations(model, piece.low, piece.high)
-        self._rows = LikeRows(model, self.like, *self._ends)
-
-    def operator(self, of: Coefficients) -> StationRows:
-        """Rows of a sum of M, K and C with ones for held unknowns, cut off at the ends of the
-        stretch."""
-        return self.operator_and(of, [])[0]
-
-    def operator_and(self, of: Coefficients, sums: Sequence[Coefficients]) -> list[StationRows]:
-        """The same, and those of more ``sums``, without what is held: by one walk along the
-        elements."""
-        ones = [1.0, *[0.0] * len(sums)]
-        rows = self._rows.sums_of([of, *sums], self._ends, ones)
-        if rows is None:
-            raise RunBroken(JOINED_OTHERWISE)
-        return rows
+def rows_on(
+    model: Model, piece: Piece, of: Coefficients, *sums: Coefficients
+) -> tuple[LikeStations, list[StationRows]]:
+    """Marks of the stations of the stretch that a piece is worked out on, and rows there of sums of
+    M, K and C, cut off at its ends: of the first with ones for held unknowns, of more ``sums``
+    without what is held, by one walk along the elements."""
+    starts = model.numbering.starts
+    ends = int(starts[piece.low]), int(starts[piece.high])
+    like = LikeStations(model, piece.low, piece.high)
+    rows = LikeRows(model, like, *ends).sums_of([of, *sums], ends, [1.0, *[0.0] * len(sums)])
+    if rows is None:
+        raise RunBroken(JOINED_OTHERWISE)
+    return like, rows
 
 
 def layouts_of(
@@ -257,7 +240,7 @@ def layouts_of(
     if layout is None:
         return None
     piece = pieces.first()
-    rows = Stretch(model, piece).operator(coefficients)
+    _, (rows,) = rows_on(model, piece, coefficients)
     part = stations.part(piece.low, piece.high)
     if not _residual(rows, layout, part) <= DIRECT:
         return None
@@ -266,8 +249,8 @@ def layouts_of(
 
 def _residual(rows: StationRows, layout: Layout, stations: Sections) -> float:
     """Relative residual of a solve on a stretch of the line with a load on every unknown."""
-    product = station_product(rows, 0, layout, columns=stations)
-    factors = station_factors(rows, layout, stations=stations)
+    product = station_product(rows, 0, layout, stations)
+    factors = station_factors(rows, layout, stations)
     if product is None or factors is None:
         return np.inf
     size, pad = int(stations.starts[-1]), stations.width

@@ -1,4 +1,4 @@
-"""Stations that the rows or columns of a matrix belong to, and its blocks by stations.
+"""Stations that the rows or columns of a matrix belong to.
 
 Blocks are as large as a cross-section, whatever its stations have: what one lacks is a row and a
 column of zeros.
@@ -7,28 +7,14 @@ column of zeros.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
+from catenary.solver.kernels import native
 from catenary.solver.model.unknown_registry import Unknowns
 
-
-class Places(NamedTuple):
-    """Places of stations in vectors, for kernels: arrays without entries if all are alike.
-
-    Attributes
-    ----------
-    starts : (n,) first unknown of each
-    station_type : (n,) of each
-    """
-
-    starts: np.ndarray
-    station_type: np.ndarray
-
-
-ALIKE = Places(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
+# Of stations that are all alike.
+_ALIKE = native.Sections(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
 
 
 @dataclass(frozen=True)
@@ -47,12 +33,6 @@ class Sections:
     station_type: np.ndarray
     station_types: tuple[tuple[int, ...], ...]
     width: int
-
-    @classmethod
-    def alike(cls, n: int, width: int) -> Sections:
-        """Stations that have all places."""
-        station_type = np.zeros(n, dtype=np.int64)
-        return cls(width * np.arange(n + 1), station_type, (tuple(range(width)),), width)
 
     @classmethod
     def of(cls, numbering: Unknowns, low: int, high: int) -> Sections:
@@ -77,11 +57,13 @@ class Sections:
         starts = self.starts[first : last + 1] - self.starts[first]
         return Sections(starts, self.station_type[first:last], self.station_types, self.width)
 
-    def places(self) -> Places:
+    def places(self) -> native.Sections:
         """Places of the stations as kernels read them."""
         if not self.varies:
-            return ALIKE
-        return Places(self.starts[:-1].astype(np.int64), self.station_type.astype(np.uint8))
+            return _ALIKE
+        return native.Sections(
+            self.starts[:-1].astype(np.int64), self.station_type.astype(np.uint8)
+        )
 
     def padded(self) -> Sections:
         """Return these sections with a further station of all places at both ends."""
@@ -99,45 +81,6 @@ class Sections:
         for row, places in zip(lacks, self.station_types, strict=True):
             row[list(places)] = False
         return lacks[self.station_type]
-
-
-def neighbours(
-    matrix: sparse.bsr_matrix, first: int = 0, columns: Sections | None = None
-) -> np.ndarray | None:
-    """Blocks of each row towards the start of the line, on the diagonal and towards the end.
-
-    Row i has its diagonal block in column ``first`` + i. Shape (3, n, b, b); None if the matrix has
-    blocks further away. ``columns`` are the stations of the columns; a matrix without has one block
-    for each.
-    """
-    if columns is not None and columns.varies:
-        return _of_varying(matrix, first, columns)
-    n, (size, _) = matrix.indptr.size - 1, matrix.blocksize
-    if n == 0:
-        return None
-    row = np.repeat(np.arange(n), np.diff(matrix.indptr))
-    step = matrix.indices - row - first
-    if np.abs(step).max(initial=0) > 1:
-        return None
-    blocks = np.zeros((3, n, size, size))
-    blocks[step + 1, row] = matrix.data
-    return blocks
-
-
-def _of_varying(matrix: sparse.bsr_matrix, first: int, columns: Sections) -> np.ndarray | None:
-    """``neighbours`` of a matrix in blocks of any size."""
-    entries = matrix.tocoo()
-    n = int(np.searchsorted(columns.starts, columns.starts[first] + matrix.shape[0])) - first
-    rows, row_place = places_of(entries.row + columns.starts[first], columns)
-    others, place = places_of(entries.col, columns)
-    rows -= first
-    step = others - rows - first
-    there = entries.data != 0
-    if n == 0 or np.abs(step[there]).max(initial=0) > 1:
-        return None
-    blocks = np.zeros((3, n, columns.width, columns.width))
-    blocks[step[there] + 1, rows[there], row_place[there], place[there]] = entries.data[there]
-    return blocks
 
 
 def places_of(unknowns: np.ndarray, columns: Sections) -> tuple[np.ndarray, np.ndarray]:

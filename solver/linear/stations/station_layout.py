@@ -38,13 +38,12 @@ class Layout:
     Attributes
     ----------
     pitch : unknowns of a cross-section
-    whole, places, number : for one of the ``parts`` of a layout: that layout, the places that the
-        part has of it, and its station type
+    whole, places : for one of the ``parts`` of a layout: that layout, and the places that the part
+        has of it
     """
 
     whole: Layout | None = None
     places: tuple[int, ...] = ()
-    number: int = 0
 
     def __init__(
         self,
@@ -63,19 +62,6 @@ class Layout:
         self.beside = together if beside is None else beside & together
         self.damped, self.station_types, self.factors = bool(damped), station_types, bool(factors)
         self.pitch = plane.size
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Layout) and self.key == other.key
-
-    def __hash__(self) -> int:
-        return hash(self.key)
-
-    @property
-    def key(self) -> tuple[object, ...]:
-        """Parameters of the layout, hashable."""
-        own = self.widths, self.own.tobytes(), self.beside.tobytes()
-        more = self.damped, self.station_types, self.factors, self.number
-        return (*own, *more, None if self.whole is None else self.whole.key)
 
     def changed(self, **settings: Any) -> Layout:
         """Return this layout with some other parameters, by their names."""
@@ -96,7 +82,7 @@ class Layout:
         widths = tuple(int(width) for width in np.bincount(self._plane[list(places)]) if width)
         own, beside = (joined[np.ix_(places, places)] for joined in (self.own, self.beside))
         part = Layout(widths, own, beside, self.damped, factors=self.factors)
-        part.whole, part.places, part.number = self, places, number
+        part.whole, part.places = self, places
         return part
 
     @cached_property

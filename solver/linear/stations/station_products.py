@@ -10,15 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
-from scipy import sparse
 
 from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.linear.stations.sections import Places, Sections
+from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
-from catenary.solver.linear.stations.station_rows import StationRows, rows_of
+from catenary.solver.linear.stations.station_rows import StationRows
 from catenary.solver.model.alike import kinds_of
 
 
@@ -94,15 +93,6 @@ def kinds_by_type(
     return begins, aligned_arrays.copy(np.concatenate(numbers)), n_kinds, count
 
 
-class ProductArrays(NamedTuple):
-    """Arrays of a ``StationProduct`` as kernels read them."""
-
-    kinds: np.ndarray
-    blocks: np.ndarray
-    first: int
-    sections: Places
-
-
 class StationProduct:
     """Products with rows of K, and C if the layout is damped. Not collective.
 
@@ -116,7 +106,7 @@ class StationProduct:
     first : station in the factor of the first row; the factor has one before and one after all
         rows, which is zero where the line ends
     n_kinds : how many rows are different
-    arrays : ProductArrays
+    arrays : ``native.ProductArrays``
     """
 
     def __init__(
@@ -130,7 +120,7 @@ class StationProduct:
     ) -> None:
         self.layout, self.stations, self.kinds = layout, stations, kinds
         self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
-        self.arrays = ProductArrays(kinds, blocks, first, stations.places())
+        self.arrays = native.ProductArrays(kinds, blocks, first, stations.places())
 
     @cached_property
     def _products(self) -> native.Products:
@@ -151,44 +141,34 @@ class StationProduct:
 
 
 def station_product(
-    matrix: sparse.bsr_matrix | StationRows,
+    rows: StationRows,
     first: int,
     layout: Layout,
-    damping: sparse.bsr_matrix | StationRows | None = None,
-    columns: Sections | None = None,
+    columns: Sections,
+    damping: StationRows | None = None,
 ) -> StationProduct | None:
-    """Products with a matrix in sorted blocks, or with its rows by stations.
-
-    None if the matrix has entries outside of the layout.
+    """Products with the rows of a matrix by stations; None if it has entries outside of the layout.
 
     Parameters
     ----------
-    matrix : sparse.bsr_matrix or StationRows
-        Matrix whose rows are multiplied, one block for each station.
+    rows : StationRows
+        Rows of the matrix.
     first : int
         Station of the columns that the first row belongs to.
     layout : Layout
         Layout of the rows.
-    damping : sparse.bsr_matrix or StationRows, optional
+    columns : Sections
+        Stations of the columns. The operand has one more station at both ends.
+    damping : StationRows, optional
         C, with kinds of the same stations; its product is subtracted.
-    columns : Sections, optional
-        Stations of the columns, all of one type if not given. The operand has one more station at
-        both ends.
     """
-    rows = rows_of(matrix, first, columns)
-    damped = None if damping is None else rows_of(damping, first, columns)
-    if rows is None or (damping is not None and damped is None):
-        return None
-    n_rows = rows.kinds.size
-    if columns is None:
-        columns = Sections.alike(first + n_rows + 1, layout.pitch)
-    stations = columns.padded()
-    packed = packed_rows(
-        layout, rows, damped, stations.station_type[first + 1 : first + 1 + n_rows]
-    )
+    stations, first = columns.padded(), first + 1
+    of_rows = stations.station_type[first : first + rows.kinds.size]
+    packed = packed_rows(layout, rows, damping, of_rows)
     if packed is None:
         return None
-    return StationProduct(layout, stations, *packed[:2], first + 1, packed[2])
+    kinds, numbers, n_kinds = packed
+    return StationProduct(layout, stations, kinds, numbers, first, n_kinds)
 
 
 def packed_rows(

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from catenary.solver.linear.stations.like_stations import LikeStations
-from catenary.solver.linear.stations.sections import Sections, neighbours, places_of
+from catenary.solver.linear.stations.sections import Sections, places_of
 from catenary.solver.model.entries import iterate_sums
 from catenary.solver.model.model import Model
 
@@ -40,20 +39,6 @@ class StationRows(NamedTuple):
         order = np.argsort(first)
         kinds = np.argsort(order).astype(np.int32)[kinds]
         return StationRows(kinds, first[order], self.blocks[:, used[order]])
-
-
-def rows_of(
-    matrix: sparse.bsr_matrix | StationRows, first: int = 0, columns: Sections | None = None
-) -> StationRows | None:
-    """Rows of a matrix in sorted blocks, each a kind of its own; ``first`` and ``columns`` as in
-    ``neighbours``."""
-    if isinstance(matrix, StationRows):
-        return matrix
-    blocks = neighbours(matrix, first, columns)
-    if blocks is None:
-        return None
-    every = np.arange(blocks.shape[1])
-    return StationRows(every.astype(np.int32), every, blocks)
 
 
 class LikeRows:

@@ -70,9 +70,8 @@ class RowLayout:
 
 def _part_of(shown: np.ndarray, sources: Sources, array: np.ndarray) -> slice | None:
     """Place of an array in the row that a step shows, None if it is not a part of it."""
-    outputs = sources.pantographs.outputs
-    for whole, at in ((shown, 0), (outputs, 0)):
+    for whole in (shown, sources.pantographs.outputs):
         begin = array.ctypes.data - whole.ctypes.data
         if 0 <= begin and begin + array.nbytes <= whole.nbytes and array.flags.c_contiguous:
-            return slice(at + begin // 8, at + begin // 8 + array.size)
+            return slice(begin // 8, begin // 8 + array.size)
     return None

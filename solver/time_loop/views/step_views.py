@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.contact.followed_links import FollowedLinks
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
-from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.model.gauges import Gauges, gauges_of
 from catenary.solver.model.switching_links import NO_LINKS, Dependents, LinkArrays, padded
@@ -32,35 +31,12 @@ from catenary.solver.time_loop.views.checkpoints import Checkpoints, State
 from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.time_loop.views.row_layout import RowLayout
 from catenary.solver.time_loop.views.shown_line import LineEnergy, ShownMotion
-from catenary.solver.window.moving_columns import Columns, MovingColumns, columns_of
+from catenary.solver.window.moving_columns import MovingColumns, columns_of
 
 # Parts of a step that can be seen, more with each.
 _ROW, _MOTION, _STATE = range(3)
-# Channels of the first tables of ``Shown.columns``.
+# Channels of the first tables of ``shown.columns``.
 _OF_COLUMNS = ("arm_uplift", "dropper_force")
-
-
-class Shown(NamedTuple):
-    """Values of a rank's part of the line at the end of a step.
-
-    Attributes
-    ----------
-    motion : Motion
-    arms : (k,) int, unknowns of vertical displacement at steady arms
-    droppers, others : links, all but droppers
-    dropper_bends, other_bends : of these
-    other_force : (m,) room for the forces of the latter [N]
-    columns : of arms, droppers and others
-    """
-
-    motion: Motion
-    arms: np.ndarray
-    droppers: LinkArrays
-    others: LinkArrays
-    dropper_bends: Dependents
-    other_bends: Dependents
-    other_force: np.ndarray
-    columns: Columns
 
 
 class Showing:
@@ -74,7 +50,7 @@ class Showing:
 
     Attributes
     ----------
-    shown : Shown
+    shown : ``native.Shown``, of the rank's part of the line
     layout : of a row of a view
     motion : ShownMotion
     checkpoints : Checkpoints
@@ -130,7 +106,7 @@ class Showing:
             n_local,
             None if window is None else window.stations,
         )
-        self.shown = Shown(self._line.motion.read, self._arm_rows, *links, force, columns)
+        self.shown = native.Shown(self._line.motion.read, self._arm_rows, *links, force, columns)
         stepped = slice(self._line.ownership.first, self._line.ownership.last)
         load = line.load[stepped] if self._unbalanced else np.zeros(0)
         self._energy = LineEnergy(self._line, interaction.links, load, columns)

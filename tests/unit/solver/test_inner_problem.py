@@ -12,23 +12,24 @@ from hypothesis import strategies as st
 
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import Coupled, LineResponse
+from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import HertzInSteps, LinearInSteps
+from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
 
 EPS = np.finfo(float).eps
 
 
-def coupled(coupling: np.ndarray, kept: float = 0.0) -> Coupled:
+def coupled(coupling: np.ndarray, kept: float = 0.0) -> native.Coupled:
     """Links that slacken with couplings G (m, m) as a band: ``band[e, d - e + half]`` is G_de."""
     m = len(coupling)
     half = max(m - 1, 0)
     band = np.zeros((m, 2 * half + 1))
     for e in range(m):
         band[e, half - e : half - e + m] = coupling[:, e]
-    return Coupled(
+    return native.Coupled(
         band, np.full(m, 1.0 - kept), np.ones(m, dtype=bool), np.zeros(m, int), np.zeros(m)
     )
 

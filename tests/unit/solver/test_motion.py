@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
+from catenary.solver.integrators.line_state import LineState, Newmark, PredictedLineState
 from catenary.solver.kernels import native
 
 RNG = np.random.default_rng(5)
 N = 12
-STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+STEPS = Newmark(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
 # Sums of some numbers of order one.
 ROUND_OFF = 1e-15
 

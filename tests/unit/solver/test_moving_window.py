@@ -17,7 +17,6 @@ from catenary import InputError
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
-from catenary.solver.kernels import native
 from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import BOUNDED, EXACT, Damping, Problem, WindowChoice
@@ -25,7 +24,7 @@ from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views.observers import Observer, StepView
 from catenary.solver.window.choice import opens_window
-from catenary.solver.window.moving_columns import MovedStations, columns_of
+from catenary.solver.window.moving_columns import MovedStations, columns_of, widen
 
 LINE = ac_simple_line(12)
 SPEED, START = 70.0, 330.0
@@ -226,7 +225,7 @@ def test_a_row_is_out_of_date_where_anything_moved_since_it_was_filled() -> None
     moved.begin(0)
     assert moved.behind.tolist() == [[0, 10], [0, 10]] and moved.now.tolist() == [0, 2]
     ends[:] = 1, 4
-    native.take_in(moved.now, ends)
+    widen(moved.now, *ends.tolist())
     moved.end(1, 1)
     assert moved.behind.tolist() == [[0, 4], [0, 10]]
     moved.begin(1)

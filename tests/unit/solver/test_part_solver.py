@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from petsc4py import PETSc
+from repeating_line import alike, rows_of
 from scipy import sparse
 
 from catenary.solver.linear.petsc_solvers import PartSolver, Wrapped
@@ -38,7 +39,8 @@ def test_all_factors_give_the_same_answer(option: str | None, hurries: bool) -> 
     if option is not None:
         options["march_pc_type"] = option
     try:
-        solver = PartSolver(lambda: matrix, slice(0, N_STATIONS), True, True, Layout((4,)))
+        by_stations = Layout((4,)), alike(N_STATIONS, 4), rows_of(matrix)
+        solver = PartSolver(lambda: matrix, slice(0, N_STATIONS), True, True, *by_stations)
     finally:
         options.delValue("march_pc_type")
     if hurries:
@@ -56,10 +58,16 @@ def test_a_solver_that_nobody_destroyed_does_not_crash_the_end_of_python() -> No
     """PETSc is finalised after Python, and cannot free what is written in Python then."""
     code = (
         "import numpy as np; from scipy import sparse; "
+        "from catenary.solver.linear.stations.sections import Sections; "
         "from catenary.solver.linear.stations.station_layout import Layout; "
+        "from catenary.solver.linear.stations.station_rows import StationRows; "
         "from catenary.solver.linear.petsc_solvers import PartSolver; "
         "whole = sparse.identity(8).tobsr((4, 4)); "
-        "kept = PartSolver(lambda: whole, slice(0, 2), True, True, Layout((4,))); "
+        "blocks = np.eye(4) * np.array([[0, 0], [1, 1], [0, 0]])[..., None, None]; "
+        "rows = StationRows(np.arange(2, dtype=np.int32), np.arange(2), blocks); "
+        "stations = Sections(4 * np.arange(3), np.zeros(2, int), ((0, 1, 2, 3),), 4); "
+        "by_stations = Layout((4,)), stations, rows; "
+        "kept = PartSolver(lambda: whole, slice(0, 2), True, True, *by_stations); "
         "kept.itself = kept"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=240)

@@ -6,16 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from repeating_line import layout, line
+from repeating_line import layout, line, station_factors, station_product
 
-from catenary.solver.integrators.line_state import PredictedLineState, Steps
+from catenary.solver.integrators.line_state import Newmark, PredictedLineState
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
-from catenary.solver.linear.station_factors import station_factors
-from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations
 
-STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+STEPS = Newmark(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
 # Numbers of order one; the order of a sum differs.
 ROUND_OFF = 1e-13
 
@@ -62,5 +60,5 @@ def answers(target: str, widths: tuple[int, ...]) -> tuple[np.ndarray, ...]:
     parts = ByStations(product, factors, ahead, ahead, answer, 0.0)
     passes = StationPasses(parts, rng.standard_normal(b * n), motion, STEPS)
     for _ in range(2):
-        passes.step()
+        passes.native.step()
     return force, solution, motion.displacement.copy(), motion.velocity

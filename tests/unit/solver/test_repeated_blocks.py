@@ -6,17 +6,14 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from repeating_line import layout, line, widths_of
+from repeating_line import layout, line, neighbours, station_factors, station_product, widths_of
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from catenary.solver.linear.station_factors import station_factors
-from catenary.solver.linear.stations.sections import neighbours
 from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
 from catenary.solver.linear.stations.station_products import (
     layout_of,
     of_pairs,
-    station_product,
 )
 
 RNG = np.random.default_rng(7)

@@ -11,15 +11,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from repeating_line import layout, line
+from repeating_line import layout, line, station_factors, station_product
 
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.line_response import LineResponse, affine
 from catenary.solver.contact_problem.complementarity import InnerProblem, room_for
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
 from catenary.solver.kernels import native
-from catenary.solver.linear.station_factors import station_factors
-from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.problem.contact_laws import LinearLaw
 
 N, S, K = 3, 2, 4
@@ -52,7 +50,7 @@ CALLS = {
     "move_bodies": (np.zeros((N + 1, 3)), np.ones((N + 1, 4)), np.zeros(6 * N)),
     "add_gyroscopic_moments": (np.zeros(6 * N), np.zeros((N, 3)), np.zeros((N + 1, 3))),
     "find_solution": system(N),
-    "solve": (small_problem(),),
+    "solve": (small_problem(), None),
 }
 
 

@@ -15,11 +15,13 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.integrators import slow_path
+from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop import march as time_loop
+from catenary.solver.time_loop.compiled_steps import CompiledSteps
 from catenary.solver.time_loop.march import Outcome
-from catenary.solver.time_loop.single_steps import REASONS, single_steps_of
+from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import RUN, Channel
 
@@ -124,7 +126,19 @@ def test_other_ways_through_a_step_have_reasons_of_their_own() -> None:
 
 
 def test_the_reason_that_costs_most_is_told() -> None:
-    factors = [reason.factor for reason in REASONS]
-    assert factors == sorted(factors, reverse=True) and min(factors) > 1.0
-    told = single_steps_of(problem(adaptive_tolerance=5.0, coupling="iterated"))
-    assert told is not None and "iterated" in told.reason
+    adapted, both = {"adaptive_tolerance": 5.0}, {"adaptive_tolerance": 5.0, "coupling": "iterated"}
+    of_one, of_both = single_steps_of(problem(**adapted)), single_steps_of(problem(**both))
+    assert of_one is not None and of_both is not None and "iterated" in of_both.reason
+    assert of_both.factor > of_one.factor > 1.0
+
+
+def test_steps_whose_free_part_others_take_are_refused_as_a_prepared_line(mesh: LineMesh) -> None:
+    class Apart(CompiledSteps):
+        """Steps as an ensemble takes them."""
+
+        def _made(self, parts: native.StepParts, block: native.Block) -> Any:
+            return super()._made(parts._replace(free=None), block)
+
+    march, _ = start_march(problem(), mesh)
+    with march, pytest.raises(ValueError, match="these steps are taken by an ensemble"):
+        Apart(*march.in_loop(), shows=False).steps().write("nowhere", None)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from repeating_line import layout, line, widths_of
+from repeating_line import layout, line, station_factors, station_product, widths_of
 
-from catenary.solver.integrators.line_state import LineState, PredictedLineState, Steps
+from catenary.solver.integrators.line_state import LineState, Newmark, PredictedLineState
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
-from catenary.solver.linear.station_factors import station_factors
-from catenary.solver.linear.stations.station_products import station_product
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import RESERVE, LinkArrays
 
 RNG = np.random.default_rng(11)
-STEPS = Steps(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+STEPS = Newmark(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
 LAWS = np.zeros(2000, dtype=RESERVE)
 for name in ("rest", "stiffness", "damping"):
     LAWS[name] = RNG.standard_normal(LAWS.size)
@@ -75,7 +73,7 @@ def compare(
     )
     links = LinkArrays(ends, RNG.standard_normal(ends.shape), LAWS[: len(ends)])
     passes.track_links(links, tension)
-    passes.step()
+    passes.native.step()
     found = motion.displacement, motion.velocity, answer[own], tension
     plain = LineState(*expected, (0.0, 0.0)).read
     native.reserves(plain, links, pulls)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import platform
+import shutil
+import subprocess
 from contextlib import nullcontext
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +17,7 @@ from small_lines import en50318_line, mesh_of, numerics, problem_of, train
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.time_loop import march
 
+KERNELS = Path(__file__).parents[3] / "solver" / "kernels"
 TINY = np.finfo(float).tiny
 
 known = pytest.mark.skipif(
@@ -40,6 +45,34 @@ def test_they_are_themselves_again_after_an_error() -> None:
     with pytest.raises(RuntimeError), flushed():
         raise RuntimeError
     assert tenth_of_the_least() > 0.0
+
+
+PROGRAM = """
+#include "base/flush_to_zero.hpp"
+int main() {
+    volatile double least = 2.3e-308, tenth = 0.1;
+    try {
+        const catenary::FlushedSubnormals flushed;
+        if (least * tenth != 0.0) return 1;
+        throw 2;
+    } catch (int) {
+    }
+    return least * tenth > 0.0 ? 0 : 3;
+}
+"""
+
+
+@known
+@pytest.mark.process
+def test_they_are_themselves_again_after_an_error_of_a_kernel(tmp_path: Path) -> None:
+    compiler = os.environ.get("CXX", "g++")
+    if shutil.which(compiler) is None:
+        pytest.skip(f"there is no {compiler}")
+    (tmp_path / "a.cpp").write_text(PROGRAM)
+    sources = [str(tmp_path / "a.cpp"), str(KERNELS / "base" / "flush_to_zero.cpp")]
+    program = str(tmp_path / "a")
+    subprocess.run([compiler, "-std=c++20", f"-I{KERNELS}", *sources, "-o", program], check=True)
+    assert subprocess.run([program]).returncode == 0
 
 
 def test_usual_numbers_round_as_ever() -> None:

@@ -6,14 +6,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from repeating_line import holding, lacking, line, sections_of
+from repeating_line import (
+    holding,
+    lacking,
+    line,
+    neighbours,
+    sections_of,
+    station_factors,
+    station_product,
+)
 
-from catenary.solver.linear.station_factors import StationFactors, station_factors
-from catenary.solver.linear.stations.sections import neighbours
+from catenary.solver.linear.station_factors import StationFactors
 from catenary.solver.linear.stations.station_products import (
     StationProduct,
     layout_of,
-    station_product,
     with_damping,
 )
 

@@ -136,7 +136,7 @@ def test_columns_that_reach_further_than_those_tried_are_borne_or_told(
 def test_factors_of_pieces_must_be_finite() -> None:
     _, operators, _ = histories(*scene(1.0))
     factors, made = operators.factors, operators.pieces.first()
-    rows = operator_pieces.Stretch(operators._model, made).operator(operators._coefficients)
+    _, (rows,) = operator_pieces.rows_on(operators._model, made, operators._coefficients)
     broken = rows._replace(blocks=np.full_like(rows.blocks, np.nan))
     with pytest.raises(RunBroken, match="singular or not finite"):
         factors.make(made, broken)
