@@ -39,16 +39,16 @@ def mesh_of(scene: Scene, path: Path | None = None) -> LineMesh:
     line, own = line_of(scene), scene.mesh.file
     if own is not None:
         return use_mesh(line, Path(own))
-    mesh = make_mesh(
+    size = size_of(scene)
+    if size is not None and size.nodes > MANY_NODES:
+        logging.getLogger("catenary.mesh").warning("%s", size.sentence())
+    return make_mesh(
         line,
         scene.mesh.elements_per_gap,
         path,
         support_refinement=scene.mesh.support_refinement,
         grading=scene.mesh.grading,
     )
-    if mesh.n_nodes > MANY_NODES and (size := size_of(scene)) is not None:
-        logging.getLogger("catenary.mesh").warning("%s", size.sentence())
-    return mesh
 
 
 def write_mesh_of(scene: Scene, path: Path, force: bool) -> LineMesh:

@@ -11,6 +11,7 @@ import pytest
 from measuring import check
 from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of
 
+from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.track import Curve
 from catenary.solver.problem.defects import Defect, MissingDropper, WornWire, WrongTension
@@ -81,7 +82,7 @@ def test_a_short_line_rests_as_the_middle_of_a_long_one(lateral: str, what: str)
         elif what == "wear":
             defects = (worn(SHORT + 2 * before),)
         elif what == "a dropper":
-            defects = (MissingDropper(SPAN * (before + 2) + 44.75),)
+            defects = (MissingDropper(DropperPlace(SPAN * (before + 2) + 44.75)),)
         windy = what == "wind" and changed
         return resting(lateral, ends, before, *(defects if changed else ()), windy=windy)
 
