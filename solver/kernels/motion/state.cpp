@@ -1,9 +1,33 @@
 // Loops over the motion of a rank's part of a line.
 #include "motion/state.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "base/targets.hpp"
 
 namespace catenary {
+
+void find_peak(const Motion& motion, int64_t begin, int64_t end, std::span<double> peak) {
+    const int64_t n = motion.spacing;
+    std::ranges::fill(peak, 0.0);
+    for (int64_t i = begin * n; i < end * n; i += n)
+        for (int64_t lane = 0; lane < n; ++lane) {
+            peak[lane] = std::max(peak[lane], std::abs(motion.x[i + lane]));
+            peak[n + lane] = std::max(peak[n + lane], std::abs(motion.y[i + lane]));
+        }
+}
+
+bool moves(const Motion& motion, int64_t begin, int64_t end, std::span<const double> peak,
+           double share) {
+    const int64_t n = motion.spacing;
+    for (int64_t i = begin * n; i < end * n; i += n)
+        for (int64_t lane = 0; lane < n; ++lane)
+            if (!(std::abs(motion.x[i + lane]) <= share * peak[lane] &&
+                  std::abs(motion.y[i + lane]) <= share * peak[n + lane]))
+                return true;
+    return false;
+}
 
 CATENARY_FOR_TARGETS
 void predict(std::span<double> displacement, std::span<double> velocity,

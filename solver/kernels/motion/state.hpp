@@ -25,6 +25,13 @@ inline double velocity_at(int64_t unknown, const Motion& motion) {
     return motion.shares[3] * motion.y[at] + motion.shares[4] * motion.z[at];
 }
 
+/// Fill in the largest |x| of each motion side by side, and then the largest |y|, at the unknowns
+/// from `begin` to `end`.
+void find_peak(const Motion& motion, int64_t begin, int64_t end, std::span<double> peak);
+/// Whether one of these unknowns moves by more than a share of such a `peak`, or holds NaN.
+bool moves(const Motion& motion, int64_t begin, int64_t end, std::span<const double> peak,
+           double share);
+
 /// Factors of a step of Newmark's method.
 struct Newmark {
     double dt;                                  ///< [s]

@@ -33,25 +33,11 @@ double place_of_span(std::span<const double> masts, double number) {
     return masts[i] + (number - i) * (masts[i + 1] - masts[i]);
 }
 
-/// Find the largest motion in the window.
-void find_peak(const Window& window, const Motion& motion) {
-    double largest_x = 0.0, largest_y = 0.0;
-    for (int64_t i = window.starts[window.at().low]; i < window.starts[window.at().high]; ++i) {
-        largest_x = std::max(largest_x, std::abs(motion.x[i]));
-        largest_y = std::max(largest_y, std::abs(motion.y[i]));
-    }
-    window.peak[0] = largest_x;
-    window.peak[1] = largest_y;
-}
-
-/// Whether any of the stations from `begin` to `end` moves, or holds NaN.
+/// Whether any of the stations from `begin` to `end` that are in the window moves.
 bool moves(const Window& window, const Motion& motion, int64_t begin, int64_t end) {
-    const double of_x = window.by_motion * window.peak[0], of_y = window.by_motion * window.peak[1];
     begin = std::max(begin, window.at().low);
     end = std::max(begin, std::min(end, window.at().high));
-    for (int64_t i = window.starts[begin]; i < window.starts[end]; ++i)
-        if (!(std::abs(motion.x[i]) <= of_x && std::abs(motion.y[i]) <= of_y)) return true;
-    return false;
+    return moves(motion, window.starts[begin], window.starts[end], window.peak, window.by_motion);
 }
 
 struct Range {
@@ -153,7 +139,8 @@ bool update(const Window& window, const Motion& motion) {
     if (window.by_motion > 0.0) {
         const int64_t updates = step / window.every;
         if (is_fresh || updates < kPeakEvery || updates % kPeakEvery == 0)
-            find_peak(window, motion);
+            find_peak(motion, window.starts[window.at().low], window.starts[window.at().high],
+                      window.peak);
         range = follow_motion(window, motion, range);
     } else {
         const auto& masts = window.masts;

@@ -2,7 +2,6 @@
 #include "tangents/lane_passes.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 namespace catenary {
@@ -53,12 +52,15 @@ void LanePasses::follow(const Motion* march) {
     if (look % kEvery != 0 || (ends_.begin == 0 && ends_.end == n_stations())) return;
     const bool is_peak = look < kEvery * kPeakEvery || look % (kEvery * kPeakEvery) == 0;
     bool before = false, behind = false;
-    auto look_at = [&](const Motion& motion, Peak& peak) {
-        if (is_peak) find_peak(motion, peak);
+    const int64_t first = std::min(ends_.begin + guard_, ends_.end),
+                  last = std::max(ends_.end - guard_, ends_.begin);
+    auto look_at = [&](const Motion& motion, std::vector<double>& peak) {
+        peak.resize(2 * motion.spacing);
+        if (is_peak) find_peak(motion, begin(), end(), peak);
         before =
-            before || (ends_.begin > 0 && moves(motion, peak, ends_.begin, ends_.begin + guard_));
+            before || (ends_.begin > 0 && moves(motion, begin(), starts_[first], peak, kAtRest));
         behind = behind ||
-                 (ends_.end < n_stations() && moves(motion, peak, ends_.end - guard_, ends_.end));
+                 (ends_.end < n_stations() && moves(motion, starts_[last], end(), peak, kAtRest));
     };
     look_at(parts_.arrays.motion, own_);
     if (march) look_at(*march, of_march_);
@@ -68,30 +70,6 @@ void LanePasses::follow(const Motion* march) {
 
 void LanePasses::step() {
     if (ends_.begin < ends_.end) line_.line.step(line_.work, ends_, n_stations(), *this);
-}
-
-void LanePasses::find_peak(const Motion& motion, Peak& peak) const {
-    const int64_t lanes = motion.spacing;
-    peak.x.assign(lanes, 0.0);
-    peak.y.assign(lanes, 0.0);
-    for (int64_t u = begin(); u < end(); ++u)
-        for (int64_t lane = 0; lane < lanes; ++lane) {
-            peak.x[lane] = std::max(peak.x[lane], std::abs(motion.x[u * lanes + lane]));
-            peak.y[lane] = std::max(peak.y[lane], std::abs(motion.y[u * lanes + lane]));
-        }
-}
-
-/// Whether a station from `begin` to `end` moves, or holds NaN.
-bool LanePasses::moves(const Motion& motion, const Peak& peak, int64_t begin, int64_t end) const {
-    const int64_t lanes = motion.spacing;
-    begin = starts_[std::max(begin, ends_.begin)];
-    end = starts_[std::min(end, ends_.end)];
-    for (int64_t u = begin; u < end; ++u)
-        for (int64_t lane = 0; lane < lanes; ++lane)
-            if (!(std::abs(motion.x[u * lanes + lane]) <= kAtRest * peak.x[lane] &&
-                  std::abs(motion.y[u * lanes + lane]) <= kAtRest * peak.y[lane]))
-                return true;
-    return false;
 }
 
 }  // namespace catenary

@@ -33,12 +33,6 @@ class LanePasses : private Around {
     void after_stretch() override {}
     int64_t n_stations() const { return size(starts_) - 1; }
     void move(int64_t begin, int64_t end);
-    /// Largest x and y of each motion side by side.
-    struct Peak {
-        std::vector<double> x, y;
-    };
-    void find_peak(const Motion& motion, Peak& peak) const;
-    bool moves(const Motion& motion, const Peak& peak, int64_t begin, int64_t end) const;
 
     PassParts parts_;
     PassLine line_;
@@ -47,7 +41,7 @@ class LanePasses : private Around {
     int64_t middle_;  ///< where elimination ends on the whole line
     Ends ends_;
     int64_t n_followed_ = 0;
-    Peak own_, of_march_;
+    std::vector<double> own_, of_march_;  ///< largest motions, see `find_peak`
 };
 
 }  // namespace catenary
