@@ -21,16 +21,20 @@ SETTINGS = {
     "OMPI_MCA_orte_create_session_dirs": "0",
     "HWLOC_PLUGINS_BLACKLIST": "hwloc_gl.so,hwloc_opencl.so",
 }
+# What Open MPI 4 leaves in the environment of a process that no launcher has started, with which no
+# launcher starts from there.
+_LEFT = ("OMPI_MCA_ess", "OMPI_MCA_pmix")
 
 
 @contextlib.contextmanager
 def settings() -> Iterator[None]:
     """Within the context MPI starts as a single process, unless mpirun started it. Not collective.
 
-    Variables that the environment already sets keep their values. Those set here are removed
-    afterwards: a process started later may be a launcher.
+    Variables that the environment already sets keep their values. Those set here, and what MPI adds
+    of its own, are removed afterwards: a process started later may be a launcher.
     """
-    own = {} if launched_by_mpirun() else SETTINGS
+    is_launched = launched_by_mpirun()
+    own = {} if is_launched else SETTINGS
     added = {name: value for name, value in own.items() if name not in os.environ}
     os.environ.update(added)
     try:
@@ -38,6 +42,9 @@ def settings() -> Iterator[None]:
     finally:
         for name in added:
             del os.environ[name]
+        for name in () if is_launched else _LEFT:
+            if name not in os.environ:
+                os.unsetenv(name)  # which the process's own environment has, unlike os.environ
 
 
 def world() -> Any:

@@ -130,4 +130,6 @@ def set_up_logging(comm: Any, verbose: bool = False, quiet: bool = False) -> Non
 
 def launched_by_mpirun() -> bool:
     """Whether this process was started by an MPI launcher. Not collective."""
+    if os.environ.get("OMPI_MCA_ess") == "singleton":
+        return False  # but by a process that has started MPI without one, and hands its rank down
     return any(name in os.environ for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"))

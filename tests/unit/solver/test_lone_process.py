@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from program import RANKS_ENVIRONMENT
 
 from catenary.base.lone_process import SETTINGS, settings
 
 
 @pytest.fixture(autouse=True)
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (*SETTINGS, "OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"):
+    of_ranks = "OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK", "OMPI_MCA_ess", "OMPI_MCA_pmix"
+    for name in (*SETTINGS, *of_ranks):
         monkeypatch.delenv(name, raising=False)
 
 
@@ -37,6 +40,39 @@ def test_ranks_of_a_launcher_reach_each_other(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
     with settings():
         assert not set(SETTINGS) & set(os.environ)
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("start", ["from catenary.base.lone_process import world; world()",
+                                   "import catenary; from mpi4py import MPI"])  # fmt: skip
+def test_programs_that_a_process_with_mpi_starts_have_no_rank(start: str) -> None:
+    """As a cell of a notebook that begins with `!`. Open MPI hands the rank down."""
+    tell = "from catenary.base.parallel import launched_by_mpirun as own; print(own())"
+    program = (
+        f"import subprocess, sys; {start}; "
+        f"subprocess.run([sys.executable, '-c', {tell!r}], check=True)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout == "False\n", done.stderr
+
+
+@pytest.mark.process
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="needs mpirun")
+def test_a_process_with_mpi_may_start_mpirun() -> None:
+    """It ended without a word."""
+    rank = "from mpi4py import MPI; print(MPI.COMM_WORLD.size)"
+    program = (
+        "import subprocess, sys; from catenary.base.lone_process import world; world(); "
+        "subprocess.run(['mpirun', '-n', '2', '--oversubscribe', sys.executable, '-c', "
+        f"{rank!r}], check=True)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, **RANKS_ENVIRONMENT},
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.split() == ["2", "2"], done.stderr
 
 
 @pytest.mark.process
