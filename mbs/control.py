@@ -9,38 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from catenary.solver.kernels import native
-
-_N_MEMORY = native.REGULATION_MEMORY.itemsize // 8
-
-
-class ControlArrays(NamedTuple):
-    """Arrays of a controller; `solver/kernels/heads/regulation.hpp` explains the names.
-
-    Attributes
-    ----------
-    settings : (1,) ``native.REGULATION``
-    gains : (g,) ``native.CONTROL_GAINS``
-    numbers : (k,) all that is remembered: ``memory``, and behind it forces that wait
-    """
-
-    settings: np.ndarray
-    gains: np.ndarray
-    numbers: np.ndarray
-
-    @property
-    def memory(self) -> np.ndarray:
-        """Named part of the memory, (1,) ``native.REGULATION_MEMORY``."""
-        return self.numbers[:_N_MEMORY].view(native.REGULATION_MEMORY)
-
-    @property
-    def waiting(self) -> np.ndarray:
-        """Forces that wait [N]; kernels read it."""
-        return self.numbers[_N_MEMORY:]
 
 
 @dataclass(frozen=True)
@@ -75,7 +48,7 @@ class Regulation:
         """The delay in samples."""
         return round(self.delay / self.sample_time)
 
-    def arrays(self, dt: float) -> ControlArrays:
+    def arrays(self, dt: float) -> native.Regulation:
         """The controller before its first step, for steps of ``dt`` [s] from time 0 on."""
         settings = np.zeros(1, dtype=native.REGULATION)
         settings["of_height"], settings["target"] = self.of_height, self.target
@@ -85,9 +58,9 @@ class Regulation:
         settings["sample"] = self.sample_time
         settings["least"], settings["most"] = self.least, self.most
         gains = np.array(list(self.gains), dtype=native.CONTROL_GAINS)
-        control = ControlArrays(settings, gains, np.zeros(_N_MEMORY + self.n_delayed))
-        control.memory["next"], control.memory["samples"] = self.from_time, -1.0
-        return control
+        memory = np.zeros(1, dtype=native.REGULATION_MEMORY)
+        memory["next"], memory["samples"] = self.from_time, -1.0
+        return native.Regulation(settings, gains, memory, np.zeros(self.n_delayed))
 
 
 class Controller(Protocol):

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -50,14 +49,6 @@ class Lowering:
         return part
 
 
-class LoweringArrays(NamedTuple):
-    """A lowering as kernels take it; see `kernels/heads/head.hpp`."""
-
-    time: float
-    drop: float
-    memory: np.ndarray
-
-
 class LoweredPantograph:
     """Any pantograph, lowered and caught.
 
@@ -83,7 +74,7 @@ class LoweredPantograph:
             self._head, self._row = called.head, np.zeros(drive_width(len(model.strip_offsets)))
             self.stepped = called.stepped()
         self._now, self._memory = named(self._row), np.zeros(1, dtype=native.LOWERING_MEMORY)
-        self.stepped.lower(LoweringArrays(lowering.time, lowering.drop, self._memory))
+        self.stepped.lower(native.Lowering(lowering.time, lowering.drop, self._memory))
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:

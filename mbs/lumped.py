@@ -9,7 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from catenary.mbs.air import ON_FRAME, ON_HEAD, AirForces
-from catenary.mbs.head.head_arrays import LinearStep, SprungMasses, named
+from catenary.mbs.head.head_arrays import named
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.stepping import Stepping
@@ -76,7 +76,7 @@ class LumpedPantograph(SteppedHead):
         self._tied, self._started_at = data.tied, self._base_height
         if data.laws:
             self._put_laws(self._in_place(data, pressing, nominal_height))
-            sprung = SprungMasses(self._masses, self._stiffness, self._damping, self._push)
+            sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
             arguments = self._arrays, sprung, self._law_arrays, self._carrier
             self._step_by(native.LawfulChain(*arguments))
         else:
@@ -87,7 +87,7 @@ class LumpedPantograph(SteppedHead):
         """Whether a step is linear in its state and in what drives it."""
         return not (self.is_regulated or self._laws.laws)
 
-    def linear_step(self) -> LinearStep:
+    def linear_step(self) -> native.LinearStep:
         """A step without laws: new state = step @ state + drive * by_drive - by_force @ force, with
         the state (positions, velocities, accelerations)."""
         n = self._n
@@ -112,7 +112,7 @@ class LumpedPantograph(SteppedHead):
         )
         unit = np.vstack([newmark.position * inverse, newmark.velocity * inverse, inverse])
         by_drive = np.ascontiguousarray(unit[:, self._carrier])
-        return LinearStep(step, by_drive, unit @ self._push, inverse)
+        return native.LinearStep(step, by_drive, unit @ self._push, inverse)
 
     @property
     def tie(self) -> tuple[float, float]:

@@ -93,7 +93,7 @@ class Run:
 
         Examples
         --------
-        >>> figure = run.plot.force()
+        >>> figure = run.plot.contact_force()
         """
         # Not kept: a run that no name holds any more closes its file and frees its memory at once.
         return Pictures(lambda: self._results, lambda: self._evaluated)

@@ -65,11 +65,12 @@ def install(several_ranks: bool) -> None:
     """Handle signals from here to the end of the process. Not collective.
 
     ``several_ranks`` says whether other processes may wait for this one: a signal outside of the
-    phases of a run then aborts them all. A SIGHUP that is ignored, as under nohup, stays so.
+    phases of a run then aborts them all. A signal that is ignored, as SIGHUP under nohup or SIGINT
+    in the background of a script, stays so.
     """
     _wish.installed, _wish.several_ranks = True, several_ranks
     for number in STOPPING:
-        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+        if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _handle)
 
 

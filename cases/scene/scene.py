@@ -104,7 +104,8 @@ class Scene(Table):
 
         ``value`` is a part of the key's value, if that part alone cannot be.
         """
-        return refusal(self._origin, key, self._at(key) if value is None else value, why)
+        value = self._at(key) if value is None else value
+        return refusal(self._origin, key, value, why, by_default=not self._is_given(key))
 
     def among(
         self, key: str, known: Collection[str], has: str = "", *, name: str | None = None
@@ -131,6 +132,16 @@ class Scene(Table):
         if key.startswith("effects."):
             return self.switches()[key.removeprefix("effects.")]
         return value_at(self._tables, key)
+
+    def _is_given(self, key: str) -> bool:
+        """Whether a dotted key is written somewhere, and has no default value."""
+        here: Any = self
+        for part in key.split("."):
+            below = _written(here)
+            if part not in below:
+                return False
+            here = below[part]
+        return True
 
     def fault(self, key: str, sentence: str) -> Fault:
         """The fault of a key; ``sentence`` continues after the key's name and place."""
@@ -159,3 +170,12 @@ class Scene(Table):
         """Whether no effect that is on lifts a limit."""
         known, switches = effect_registry.registry(), self.switches()
         return not any(limit in known[name].lifts for name, on in switches.items() if on)
+
+
+def _written(value: Any) -> dict[str, Any]:
+    """What is written in a table or list, by keys or numbers."""
+    if isinstance(value, Table):
+        return {name: getattr(value, name) for name in value.model_fields_set}
+    if isinstance(value, list | tuple):
+        return {str(number): one for number, one in enumerate(value)}
+    return value if isinstance(value, dict) else {}

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -47,23 +46,6 @@ class Law:
         return self.forces[i] + slope * (x - self.points[i])
 
 
-class LawArrays(NamedTuple):
-    """m laws on n coordinates as kernels take them (`solver/kernels/heads/laws.hpp`).
-
-    Attributes
-    ----------
-    ways : (m, n) the extension of each by each coordinate
-    law : (m,) ``native.HEAD_LAW``
-    points : (k,) ``native.HEAD_LAW_POINT`` of all laws
-    pressed : (s,) contact forces of the latest step [N]
-    """
-
-    ways: np.ndarray
-    law: np.ndarray
-    points: np.ndarray
-    pressed: np.ndarray
-
-
 @dataclass(frozen=True)
 class LawsInPlace:
     """Laws on the coordinates of a pantograph that stands.
@@ -81,7 +63,7 @@ class LawsInPlace:
     by_base: np.ndarray
     zero: np.ndarray
 
-    def arrays(self, n_contacts: int) -> LawArrays:
+    def arrays(self, n_contacts: int) -> native.HeadLaws:
         """Arrays of the laws for kernels, with room for the forces of so many contacts."""
         law = np.zeros(len(self.laws), dtype=native.HEAD_LAW)
         counts = np.array([len(one.points) for one in self.laws], dtype=np.int64)
@@ -90,7 +72,7 @@ class LawsInPlace:
         law["end"] = np.cumsum(counts)
         law["begin"] = law["end"] - counts
         points = [pair for one in self.laws for pair in zip(one.points, one.forces, strict=True)]
-        return LawArrays(
+        return native.HeadLaws(
             self.ways, law, np.array(points, dtype=native.HEAD_LAW_POINT), np.zeros(n_contacts)
         )
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from catenary.mbs.control import ControlArrays, Controller, Regulation, Regulator
-from catenary.mbs.head.head_arrays import N_DRIVE, HeadArrays, NewmarkFactors, drive_width, named
+from catenary.mbs.control import Controller, Regulation, Regulator
+from catenary.mbs.head.head_arrays import N_DRIVE, drive_width, named
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import HeadParts
@@ -51,21 +51,23 @@ class SteppedHead(ABC):
         # Share of a force on the middle of the strips in the force on each coordinate.
         self._push = np.zeros(n)
         self._push[: head.n] = head.touch.mean(axis=0)
-        self._newmark = NewmarkFactors(
+        self._newmark = native.NewmarkFactors(
             dt, dt**2 * (0.5 - beta), dt * (1.0 - gamma), beta * dt**2, gamma * dt
         )
         self._state = np.zeros(3 * n)
         self._early = np.zeros((2, s))
         self.head = HeadState(s)
         roll = -1 if self._lateral is None else head.roll
-        self._arrays = HeadArrays(self._touch, self._state, self.head.numbers, self._newmark, roll)
+        self._arrays = native.HeadArrays(
+            self._touch, self._state, self.head.numbers, self._newmark, roll
+        )
         # Inputs of the coming step, and the numbers of these that have names.
         self.row = np.zeros(drive_width(s))
         self._now = named(self.row)
         self._laws: LawsInPlace = in_place((), (), n, ())
         self._law_arrays = self._laws.arrays(s)
         self._bending = None if self._lateral is None else head.bending
-        self._control: ControlArrays | None = None
+        self._control: native.Regulation | None = None
         self._controller: Controller | None = None
         self._time = 0.0
 
@@ -188,7 +190,7 @@ class SteppedHead(ABC):
         if self._laws.laws:
             parts.append(self._law_arrays.pressed)
         if self._control is not None:
-            parts.append(self._control.numbers)
+            parts += [self._control.memory.view(float), self._control.waiting]
         elif self._controller is not None:
             own = np.asarray(self._controller.state(), dtype=float).ravel()
             parts += [np.array([self.added_force]), own]
@@ -203,7 +205,8 @@ class SteppedHead(ABC):
             pressed[:] = state[begin : begin + pressed.size]
             begin += pressed.size
         if self._control is not None:
-            self._control.numbers[:] = state[begin:]
+            memory = self._control.memory.view(float)
+            memory[:], self._control.waiting[:] = np.split(state[begin:], [memory.size])
         elif self._controller is not None:
             self.stepped.added_force = float(state[begin])
             self._controller.restore(np.array(state[begin + 1 :]))

@@ -20,23 +20,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
-from catenary.mbs.head.head_arrays import SplineTables
+from catenary.mbs.head.head_arrays import spline_tables
+from catenary.solver.kernels import native
 
 # Points of the tables of modes along half a wave of the highest one.
 _POINTS_A_WAVE = 100
-
-
-class Bending(NamedTuple):
-    """Strips that bend: tables of their modes over the place on a strip [m]; the first coordinate,
-    the modes of a strip being one after the other; wires that may touch each strip."""
-
-    tables: SplineTables
-    first: int
-    wires: int
 
 
 @dataclass(frozen=True)
@@ -74,13 +65,13 @@ def shapes(n_modes: int, length: float, places: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-def mode_tables(n_modes: int, length: float) -> SplineTables:
+def mode_tables(n_modes: int, length: float) -> native.SplineTables:
     """The shapes of ``shapes`` as tables over the whole strip."""
     from scipy.interpolate import CubicSpline  # not loaded for strips that are rigid
 
     places = np.linspace(-0.5 * length, 0.5 * length, _POINTS_A_WAVE * (n_modes + 1) + 1)
     spline = CubicSpline(places, shapes(n_modes, length, places).T)
-    return SplineTables(places, np.ascontiguousarray(np.moveaxis(spline.c, 0, 2)))
+    return spline_tables(places, spline.c)
 
 
 @lru_cache(maxsize=32)
@@ -187,7 +178,7 @@ class HeadParts:
     level: np.ndarray
     roll: int
     offsets: tuple[float, ...]
-    bending: Bending | None = None
+    bending: native.Bending | None = None
 
     @cached_property
     def n(self) -> int:
@@ -272,7 +263,7 @@ def head_parts(
     offsets = strips.contact_offsets
     bending = None
     if n_modes and strips.length is not None:
-        bending = Bending(mode_tables(n_modes, strips.length), n_rigid, strips.wires)
+        bending = native.Bending(mode_tables(n_modes, strips.length), n_rigid, strips.wires)
     return HeadParts(masses, springs, dampers, touch, level, number, offsets, bending)
 
 

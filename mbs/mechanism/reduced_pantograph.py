@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.air import SQUARE, AirForces
-from catenary.mbs.head.head_arrays import MechanismArrays, SprungMasses, named
+from catenary.mbs.head.head_arrays import named, tables_at
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.stepping import Stepping
@@ -83,8 +83,8 @@ class RaisingPantograph(SteppedHead):
         self._tables = data.frame.tables
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
-        sprung = SprungMasses(self._masses, self._stiffness, self._damping, self._push)
-        mechanism = MechanismArrays(self._tables, data.head_weight, self._zero)
+        sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
+        mechanism = native.ReducedMechanism(self._tables, data.head_weight, self._zero)
         self._raised = native.RaisedHead(self._arrays, sprung, self._law_arrays, mechanism)
         self._step_by(self._raised)
 
@@ -161,4 +161,4 @@ class RaisingPantograph(SteppedHead):
         breaks = self._tables.breaks
         if not breaks[0] <= height <= breaks[-1]:
             raise self._data.frame.left(height)
-        return self._tables.at(height)
+        return tables_at(self._tables, height)

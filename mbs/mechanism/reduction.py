@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.head.head_arrays import SplineTables
+from catenary.mbs.head.head_arrays import spline_tables, tables_at
 from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import Motion, Vector
 from catenary.mbs.rigid.forces import Actuator, Force, PointForce
@@ -25,6 +25,7 @@ from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
 from catenary.mbs.rigid.statics import at_rest
 from catenary.mbs.rigid.system import System
+from catenary.solver.kernels import native
 
 # Closer than this no heights are put in [m]: a stop of 1e5 N/m is then off by some 5 N over 1 mm.
 FINEST = 5e-4
@@ -56,17 +57,17 @@ class ReducedMechanism:
 
     def at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
         """Mass, lift and damping at a height [m], shape (3,), and their slopes, per metre."""
-        values, slopes = self.tables.at(height)
+        values, slopes = tables_at(self.tables, height)
         return values[:3], slopes[:3]
 
     @cached_property
-    def tables(self) -> SplineTables:
+    def tables(self) -> native.SplineTables:
         """Splines of mass, lift, damping, carried mass and, of a mechanism that meets the air, the
         upward force of the air on its bodies."""
         listed = [self.masses, self.lifts, self.dampings, self.carried]
         columns = np.stack(listed if self.blown is None else [*listed, self.blown], axis=1)
         spline = CubicSpline(self.heights, columns)
-        return SplineTables(spline.x, np.ascontiguousarray(spline.c.transpose(1, 2, 0)))
+        return spline_tables(spline.x, spline.c)
 
     def blown_at(self, height: float) -> float:
         """Upward force on the point by the air on the bodies at a height [m], 0 without air."""

@@ -161,6 +161,8 @@ def _judged(one: Criterion | None) -> str:
         return "-"
     if one.absent:
         return _WORDS[None]
+    if np.isnan(one.value):
+        return f"no value, {_WORDS[one.passed]}"
     mark = "" if one.compared else f" {UNCOMPARED}"
     digits = decimals_that_tell(one.value, one.limit, 2)
     return f"{fixed(one.value, digits)} {one.unit} {_WORDS[one.passed]}{mark}"

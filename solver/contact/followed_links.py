@@ -12,7 +12,7 @@ from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces.column_pieces import columns_of
 from catenary.solver.linear.unit_responses import ShortColumns
-from catenary.solver.model.switching_links import Dependents, LinkArrays, LinkTable
+from catenary.solver.model.switching_links import LinkTable, some_of
 
 
 class FollowedLinks:
@@ -24,10 +24,11 @@ class FollowedLinks:
     Attributes
     ----------
     table : LinkTable of the whole line
-    local : LinkArrays of the whole table, with local unknowns, of which other ranks own some
+    local : native.Links of the whole table, with local unknowns, of which other ranks own some
     numbers : (n,) numbers in the table of the owned, unbroken links that are no dependents
-    links : LinkArrays of these, with local unknowns
-    dependents, dependent_numbers : Dependents of these links, and their numbers (m,) in the table
+    links : native.Links of these, with local unknowns
+    dependents, dependent_numbers : native.Dependents of these links, and their numbers (m,) in the
+        table
     reserve : (n,) latest reserve, computed here or by a free step of the line [N]
     moving : (2,) first of the ``links`` that may switch and the one after the last; all of them
         without a window
@@ -38,14 +39,14 @@ class FollowedLinks:
         mine = line.ownership.owned(table.arrays.unknowns[:, 0])
         self._mine = mine
         unknowns, weights, law = table.arrays
-        self.local = LinkArrays(unknowns - line.ownership.first, weights, law.copy())
+        self.local = native.Links(unknowns - line.ownership.first, weights, law.copy())
         self.numbers = np.flatnonzero(mine & ~table.broken & ~table.is_dependent)
-        self.links = self.local.of(self.numbers)
+        self.links = some_of(self.local, self.numbers)
         self.dependent_numbers = np.flatnonzero(mine & ~table.broken & table.is_dependent)
         leaders = table.leader[self.dependent_numbers]
         ends = np.append(self.numbers, table.leader.size)
-        self.dependents = Dependents(
-            self.local.of(self.dependent_numbers), np.searchsorted(leaders, ends)
+        self.dependents = native.Dependents(
+            some_of(self.local, self.dependent_numbers), np.searchsorted(leaders, ends)
         )
         self._leader = np.searchsorted(self.numbers, leaders)
         self._released = self.links.law["released"].copy()
@@ -69,15 +70,19 @@ class FollowedLinks:
         links = self.numbers, self.links, self.reserve, self.moving
         return native.Followed(*links, self.dependents, self.dependent_numbers)
 
-    def shown(self, component: str) -> tuple[np.ndarray, LinkArrays, Dependents]:
+    def shown(self, component: str) -> tuple[np.ndarray, native.Links, native.Dependents]:
         """Numbers among those of its component, and arrays, of all links that this rank owns,
         broken ones included, and what bends of these add to their forces."""
         numbers = self.table.of_component(component)
         numbers = numbers[self._mine[numbers]]
         bends, begin = self.table.bends_of(numbers)
-        add = self.local.of(bends)
+        add = some_of(self.local, bends)
         add.law["released"] *= self.table.pulls[bends]
-        return self.table.index[numbers], self.local.of(numbers), Dependents(add, begin)
+        return (
+            self.table.index[numbers],
+            some_of(self.local, numbers),
+            native.Dependents(add, begin),
+        )
 
     def find_reserve(self) -> np.ndarray:
         """Reserve in the line's present motion [N], shape (n,), overwritten by the next call."""

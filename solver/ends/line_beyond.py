@@ -92,7 +92,7 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
         beside = _matrices(model, other, other + size, other, other + size)
         beside, _ = _without(beside, other, held, (size, size))
         signs = sideways(model, start + np.arange(size))
-        if _mirrored(own, beside, joins, signs):
+        if _mirrored(own, beside, joins, signs, model.simulated.wind is not None):
             # Counted from the end of the model, every second cross-section is the other way round.
             if side == START:
                 own, joined = own * signs[:, None] * signs, joined * signs[:, None]
@@ -162,9 +162,11 @@ def sideways(model: Model, unknowns: np.ndarray) -> np.ndarray:
     return np.where(found, -1.0, 1.0)
 
 
-def _mirrored(own: np.ndarray, beside: np.ndarray, at_mast: np.ndarray, signs: np.ndarray) -> bool:
+def _mirrored(
+    own: np.ndarray, beside: np.ndarray, at_mast: np.ndarray, signs: np.ndarray, is_windy: bool
+) -> bool:
     """Whether a span is the mirror image of the one beside it, the cross-section at the mast left
-    out.
+    out. With ``is_windy`` the refusal names the wind.
 
     Raises
     ------
@@ -179,7 +181,8 @@ def _mirrored(own: np.ndarray, beside: np.ndarray, at_mast: np.ndarray, signs: n
         differences.append(max(_difference(one, other) for one, other in pairs))
     same, mirrored = differences
     if min(same, mirrored) > _ALIKE:
-        raise InputError("the last one is of another kind")
+        blown = ", as the mean wind (wind) makes spans of a zig-zag" if is_windy else ""
+        raise InputError(f"the last one is of another kind{blown}")
     return mirrored < same
 
 

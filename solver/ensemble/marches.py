@@ -17,7 +17,7 @@ from catenary.solver.ensemble.shared_line import Lane, SharedLine
 from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
-from catenary.solver.model.switching_links import NO_LINKS, Dependents
+from catenary.solver.model.switching_links import NO_LINKS
 from catenary.solver.problem.contact_laws import uses_rate
 from catenary.solver.problem.problem import steps_of
 from catenary.solver.schemes.make_scheme import one_solve
@@ -181,7 +181,7 @@ def _steps(
 
 def _nothing_of_line(motion: Motion) -> native.Shown:
     """Parts of the rows with values of the line."""
-    no_dependents = Dependents(NO_LINKS, np.zeros(1, dtype=np.int64))
+    no_dependents = native.Dependents(NO_LINKS, np.zeros(1, dtype=np.int64))
     ends = np.array([0, 1])
     columns = Columns(ends, ends, *np.zeros((2, 2, 3), dtype=np.int32))
     none = np.zeros(0, dtype=np.int64)

@@ -34,7 +34,7 @@ from catenary.solver.linear.unit_responses import UnitResponses, Windows
 from catenary.solver.model.model import Model
 from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.partition import Ownership
-from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
+from catenary.solver.model.switching_links import NO_LINKS
 from catenary.solver.window.moving_window import MovingWindow
 
 # Arrays of every state of a line.
@@ -226,7 +226,7 @@ class LineIntegrator(ABC):
         if self.window is not None:
             self.window.wake()
 
-    def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
+    def track_links(self, links: native.Links, reserve: np.ndarray) -> None:
         """Fill ``reserve`` (n,) [N] at the end of each ``free_step``, see `switching_links`.
 
         The links stand in the order along the track. Without this there are none. Not collective.

@@ -20,7 +20,7 @@ from catenary.solver.integrators.line_state import (
 )
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.step_operators import ByStations
-from catenary.solver.model.switching_links import NO_LINKS, LinkArrays
+from catenary.solver.model.switching_links import NO_LINKS
 
 # Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
 # memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
@@ -76,14 +76,14 @@ class StationPasses:
         self.known = known
         self.track_links(NO_LINKS, np.zeros(0))
 
-    def track_links(self, links: LinkArrays, reserve: np.ndarray) -> None:
+    def track_links(self, links: native.Links, reserve: np.ndarray) -> None:
         """Fill ``reserve`` on the way back, as ``LineIntegrator.track_links``.
 
         Links are looked at once the pass has left them behind, a stretch of stations at a time.
         """
         self.native.track(self.tracked(links, reserve))
 
-    def tracked(self, links: LinkArrays, reserve: np.ndarray) -> native.TrackedLinks:
+    def tracked(self, links: native.Links, reserve: np.ndarray) -> native.TrackedLinks:
         """Arguments of the kernels for ``track_links``."""
         n_pairs = max(0, self._starts.size - 2) // 2
         n_stretches = -(-n_pairs // self._stretch)
@@ -123,7 +123,7 @@ class StationPasses:
             motion=motion,
         )
 
-    def open(self, window: native.Window, links: LinkArrays, reserve: np.ndarray) -> None:
+    def open(self, window: native.Window, links: native.Links, reserve: np.ndarray) -> None:
         """Step only the stations in ``window`` from now on; ``links`` and ``reserve`` as in
         ``track_links``."""
         self.native.open(window)

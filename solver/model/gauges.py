@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.meshgen.wires import End
+from catenary.solver.kernels import native
 from catenary.solver.model import axial_elements, wire_ends
 from catenary.solver.model.model import Model
 from catenary.solver.model.stations import SAME_STATION
-from catenary.solver.model.switching_links import RESERVE, LinkArrays
+from catenary.solver.model.switching_links import RESERVE
 from catenary.solver.problem.ends import Tensioner
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import (
@@ -57,7 +58,7 @@ class Gauges(NamedTuple):
     unknowns of the line."""
 
     places: tuple[GaugePlace, ...]
-    watched: dict[str, LinkArrays]
+    watched: dict[str, native.Links]
 
 
 def gauges_of(model: Model) -> Gauges:
@@ -69,7 +70,7 @@ def gauges_of(model: Model) -> Gauges:
     tensioner = model.simulated.tensioner
     width = 10 if model.simulated.lateral else 6
     watched = {
-        name: LinkArrays(
+        name: native.Links(
             np.zeros((len(places), width), dtype=np.int64),
             np.zeros((len(places), width)),
             np.zeros(len(places), dtype=RESERVE),
@@ -97,7 +98,7 @@ def gauges_of(model: Model) -> Gauges:
 
 
 def _watch_tension(
-    model: Model, watched: dict[str, LinkArrays], i: int, place: GaugePlace, element: int
+    model: Model, watched: dict[str, native.Links], i: int, place: GaugePlace, element: int
 ) -> None:
     """Watch the tension of an ``element`` by gauge ``i``; all that it watches has its unknowns."""
     wire = model.problem.line.wires[place.wire]
@@ -114,7 +115,7 @@ def _watch_tension(
 
 def _watch_stops(
     model: Model,
-    watched: dict[str, LinkArrays],
+    watched: dict[str, native.Links],
     i: int,
     end: wire_ends.WireEnd,
     tensioner: Tensioner,
@@ -142,14 +143,14 @@ def _watch_stops(
     stop.law["rest"][i] = sign * (tension.law["rest"][i] - pull)
 
 
-def _open(table: LinkArrays, i: int, weights: np.ndarray, gap: float, stiffness: float) -> None:
+def _open(table: native.Links, i: int, weights: np.ndarray, gap: float, stiffness: float) -> None:
     """Watch a stop that is ``gap`` [m] away at rest: its force is what its reserve lacks."""
     table.weights[i], law = weights, table.law
     law["rest"][i], law["stiffness"][i] = stiffness * gap, -stiffness
     law["carried"][i], law["released"][i] = 0.0, 1.0
 
 
-def _row(table: LinkArrays, i: int, unknowns: np.ndarray, place: GaugePlace) -> None:
+def _row(table: native.Links, i: int, unknowns: np.ndarray, place: GaugePlace) -> None:
     """Give gauge ``i`` of a table its unknowns and its place; it shows its reserve unchanged."""
     table.unknowns[i] = unknowns
     table.law["place"][i], table.law["carried"][i] = place.x, 1.0

@@ -34,28 +34,12 @@ _SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 RESERVE = native.RESERVE
 
 
-class LinkArrays(NamedTuple):
-    """n links as kernels take them: ``unknowns`` (n, m) and ``weights`` (n, m) of their direction,
-    ``law`` (n,) records of ``RESERVE``."""
-
-    unknowns: np.ndarray
-    weights: np.ndarray
-    law: np.ndarray
-
-    def of(self, which: np.ndarray | slice) -> LinkArrays:
-        """Some of them."""
-        return LinkArrays(self.unknowns[which], self.weights[which], self.law[which])
+NO_LINKS = native.Links(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0, RESERVE))
 
 
-class Dependents(NamedTuple):
-    """Dependents of n links that switch: ``links`` (m,), of link d the numbers from ``begin[d]`` to
-    before ``begin[d + 1]``; ``begin`` (n + 1,)."""
-
-    links: LinkArrays
-    begin: np.ndarray
-
-
-NO_LINKS = LinkArrays(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0, RESERVE))
+def some_of(links: native.Links, which: np.ndarray | slice) -> native.Links:
+    """Some of these links."""
+    return native.Links(*(member[which] for member in links))
 
 
 @dataclass(frozen=True)
@@ -65,7 +49,7 @@ class LinkTable:
 
     Attributes
     ----------
-    arrays : LinkArrays with unknowns of the whole line
+    arrays : native.Links with unknowns of the whole line
     components : names of components
     component, index : (n,) number of the component of each link, -1 for dependents and bends, and
         its number within the component
@@ -77,7 +61,7 @@ class LinkTable:
     switches : whether any link switches
     """
 
-    arrays: LinkArrays
+    arrays: native.Links
     components: tuple[str, ...]
     component: np.ndarray
     index: np.ndarray
@@ -125,7 +109,7 @@ class _Part(NamedTuple):
     dependents and bends. The rest is as in `LinkTable`.
     """
 
-    arrays: LinkArrays
+    arrays: native.Links
     component: str
     leader: np.ndarray
     bent: np.ndarray
@@ -168,7 +152,7 @@ def switching_links(model: Model, dropper_force: np.ndarray) -> LinkTable:
 
 
 def _leading(
-    before: Sequence[_Part], arrays: LinkArrays, component: str, broken: np.ndarray
+    before: Sequence[_Part], arrays: native.Links, component: str, broken: np.ndarray
 ) -> _Part:
     """Links behind those of other parts that are their own leaders and bend none."""
     n = arrays.law.size
@@ -181,7 +165,7 @@ def _in_order(model: Model, parts: Sequence[_Part]) -> LinkTable:
     # Two unknowns at least, which kernels take without a loop.
     m = max([2, *(part.arrays.unknowns.shape[1] for part in parts)])
     padded_parts = [padded(part.arrays, m) for part in parts]
-    arrays = LinkArrays(*(np.concatenate(same) for same in zip(*padded_parts, strict=True)))
+    arrays = native.Links(*(np.concatenate(same) for same in zip(*padded_parts, strict=True)))
     # A force on an unknown that is held moves nothing.
     free = np.ones(model.n_dofs)
     free[model.constrained] = 0.0
@@ -200,7 +184,7 @@ def _in_order(model: Model, parts: Sequence[_Part]) -> LinkTable:
     for number in range(len(components)):
         own = component == number
         index[own] = np.arange(np.count_nonzero(own))
-    arrays = arrays.of(order)
+    arrays = some_of(arrays, order)
     x = model.numbering.as_vector(model.mesh.points[:, :1])
     half_length = np.abs(x[arrays.unknowns] - arrays.law["place"][:, None]).max(axis=1)
     bent = np.concatenate([part.bent for part in parts])[order]
@@ -217,7 +201,7 @@ def _in_order(model: Model, parts: Sequence[_Part]) -> LinkTable:
     )
 
 
-def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
+def _droppers(model: Model, links: Links, force: np.ndarray) -> native.Links:
     law, kept = np.zeros(links.law.size, dtype=RESERVE), model.simulated.kept_ratio
     law["rest"] = np.where(model.broken, 0.0, force)
     law["stiffness"], law["damping"] = links.law["stiffness"], model.released_damping
@@ -230,7 +214,7 @@ def _droppers(model: Model, links: Links, force: np.ndarray) -> LinkArrays:
     law["stiffness"][slack] *= -1.0
     law["damping"][slack] *= -1.0
     law["carried"][slack] = -kept
-    return LinkArrays(*links.direction, law)
+    return native.Links(*links.direction, law)
 
 
 def _released_alpha(model: Model) -> np.ndarray:
@@ -263,7 +247,7 @@ def _dropper_bends(model: Model, force: np.ndarray) -> tuple[Bends, np.ndarray]:
     return Bends(link, stretch, side[bends], change[bends]), piece == 0
 
 
-def _bends(links: Links, bends: Bends, alpha: np.ndarray, sign: np.ndarray) -> LinkArrays:
+def _bends(links: Links, bends: Bends, alpha: np.ndarray, sign: np.ndarray) -> native.Links:
     """Bends as links: ``sign`` (k,) of the force by which each acts beyond, ``alpha`` (k,) damping
     over stiffness [s]."""
     law = np.zeros(bends.link.size, dtype=RESERVE)
@@ -271,12 +255,12 @@ def _bends(links: Links, bends: Bends, alpha: np.ndarray, sign: np.ndarray) -> L
     law["stiffness"], law["damping"] = -bends.change, -alpha * bends.change
     law["place"], law["released"] = links.law["place"][bends.link], 1.0
     unknowns, weights = links.direction
-    return LinkArrays(unknowns[bends.link], sign[:, None] * weights[bends.link], law)
+    return native.Links(unknowns[bends.link], sign[:, None] * weights[bends.link], law)
 
 
-def _dependents(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
+def _dependents(model: Model) -> list[tuple[native.Links, np.ndarray]]:
     """Dependents of droppers that may slacken, and the numbers of these droppers."""
-    found: list[tuple[LinkArrays, np.ndarray]] = []
+    found: list[tuple[native.Links, np.ndarray]] = []
     if model.droppers is None:
         return found
     for direction, stiffness in swings_of_droppers(model):
@@ -287,12 +271,12 @@ def _dependents(model: Model) -> list[tuple[LinkArrays, np.ndarray]]:
         law["place"] = model.droppers.law["place"][own]
         law["released"] = 1.0 - model.simulated.kept_ratio
         if law["released"].any():
-            arrays = LinkArrays(direction.unknowns[own], direction.weights[own], law)
+            arrays = native.Links(direction.unknowns[own], direction.weights[own], law)
             found.append((arrays, own))
     return found
 
 
-def _one_sign(model: Model, links: Links) -> LinkArrays:
+def _one_sign(model: Model, links: Links) -> native.Links:
     """Links of a set that act one way, turned so that they pull."""
     given = links.law["acts"] != BOTH
     own = links.law[given]
@@ -307,12 +291,12 @@ def _one_sign(model: Model, links: Links) -> LinkArrays:
     law["place"], law["released"] = own["place"], 1.0
     law["carried"] = ~own["open"]
     weights = turned[:, None] * links.direction.weights[given]
-    return LinkArrays(links.direction.unknowns[given], weights, law)
+    return native.Links(links.direction.unknowns[given], weights, law)
 
 
-def padded(links: LinkArrays, m: int) -> LinkArrays:
+def padded(links: native.Links, m: int) -> native.Links:
     """Pad links to m unknowns each, with their last one again, without weight."""
     more = m - links.unknowns.shape[1]
     unknowns = np.pad(links.unknowns, ((0, 0), (0, more)), mode="edge")
     weights = np.pad(links.weights, ((0, 0), (0, more)))
-    return LinkArrays(unknowns.astype(np.int64), weights, links.law)
+    return native.Links(unknowns.astype(np.int64), weights, links.law)

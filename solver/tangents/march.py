@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.mbs.head.head_arrays import LinearStep
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.kernels import native
@@ -53,7 +52,7 @@ class TangentSteps(CompiledSteps):
         showing: Showing,
         dt: float,
         changes: Sequence[Change],
-        others: Sequence[Sequence[LinearStep | SteppedHead]],
+        others: Sequence[Sequence[native.LinearStep | SteppedHead]],
         starts: Sequence[np.ndarray],
     ) -> None:
         super().__init__(scheme, showing, dt, shows=True)

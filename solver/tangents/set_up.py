@@ -16,12 +16,13 @@ import numpy as np
 from scipy import sparse
 
 from catenary.base.errors import InputError
-from catenary.mbs.head.head_arrays import N_DRIVE, LinearStep, drive_width
+from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.contact_problem.law_tangents import law_in_steps
+from catenary.solver.kernels import native
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, MemoryLoad, ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
@@ -39,7 +40,7 @@ CENTRAL: Mapping[int, float] = {-1: -0.5, 1: 0.5}
 _ROUNDINGS = 64.0 * float(np.finfo(float).eps)
 # Damping is proportional if no more than such a part of it is not.
 _PROPORTIONAL = 1e-9
-_NO_STEP = LinearStep(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros((0, 0)))
+_NO_STEP = native.LinearStep(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros((0, 0)))
 _MATRICES = ("stiffness", "damping", "mass")
 
 
@@ -69,7 +70,7 @@ class SetUp:
     rest: np.ndarray
     links: np.ndarray
     weights: np.ndarray
-    heads: Sequence[LinearStep | SteppedHead]
+    heads: Sequence[native.LinearStep | SteppedHead]
     states: Sequence[np.ndarray]
     drives: np.ndarray
     law: np.ndarray
@@ -84,7 +85,7 @@ class StepChange(NamedTuple):
     """The derivative of a pantograph's step: of a linear chain ``arrays``, empty if it does not
     change; of others models ``beside`` it in the order of differences, ``step`` apart."""
 
-    arrays: LinearStep
+    arrays: native.LinearStep
     beside: Sequence[SteppedHead]
     step: float
 
@@ -273,17 +274,18 @@ def differentiate(
         return np.ascontiguousarray(values if values.any() else values[:0])
 
     def of_head(number: int) -> StepChange:
-        if not isinstance(now.heads[number], LinearStep):
+        linear = now.heads[number]
+        if not isinstance(linear, native.LinearStep):
             models = [found[side].heads[number] for side in stencil]
             beside = [model for model in models if isinstance(model, SteppedHead)]
             return StepChange(_NO_STEP, beside, step)
         parts = [
             of(lambda one, name=name: getattr(one.heads[number], name))  # type: ignore[misc]
-            for name in LinearStep._fields
+            for name in linear._fields
         ]
         if not any(part.any() for part in parts):
             return StepChange(_NO_STEP, (), step)
-        return StepChange(LinearStep(*map(np.ascontiguousarray, parts)), (), step)
+        return StepChange(native.LinearStep(*map(np.ascontiguousarray, parts)), (), step)
 
     def of_state(number: int) -> np.ndarray:
         return of(lambda one: one.states[number])

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.options import option
 from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.interface import Pantograph
@@ -48,7 +49,8 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
     line, pantographs = scheme.interaction.line, scheme.pantographs
     if line.loads is not None and line.loads.are_sampled:
         raise InputError(
-            "gusts are made under way, and a prepared line has none: take them away (wind.gusts=)"
+            "gusts are made under way, and a prepared line has none: take them away "
+            f"({option('wind.gusts=', 'wind.gusts = None in replace()')})"
         )
     if line.window is not None and not line.window.has_rows(0, line.window.arrays.low.size):
         raise InputError(

@@ -50,6 +50,8 @@ def put_more(rng: random.Random, words: Words, span: float, room: float, n_steps
         air(rng, words)
     if rng.random() < NOW_AND_THEN:
         wind(rng, words)
+    else:
+        words.pop("pantographs.reference.crosswind_factor", None)
     # Droppers must be able to slacken if they are to keep a share of their stiffness then.
     if words["effects.dropper_slackening"] == "true" and rng.random() < NOW_AND_THEN:
         words["line.dropper.residual_stiffness_ratio"] = rng.uniform(1e-3, 0.5)

@@ -24,7 +24,7 @@ from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.beam import shape_slopes, shape_values
 from catenary.solver.model.entries import iterate_entries
 from catenary.solver.model.model import Model
-from catenary.solver.model.switching_links import switching_links
+from catenary.solver.model.switching_links import some_of, switching_links
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
@@ -111,7 +111,7 @@ class WholeSystem:
 
         table = switching_links(model, form.dropper_force)
         kept = np.flatnonzero(table.arrays.law["released"] > 0.0)
-        self._links = table.arrays.of(kept)
+        self._links = some_of(table.arrays, kept)
         # Which of them decides on each: dependents go with another.
         self._leader = np.searchsorted(kept, table.leader[kept])
         unknowns, weights, _ = self._links

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -46,6 +47,7 @@ def test_runs_side_by_side_show_what_fails_by_little() -> None:
     one = Criterion("arcing NQ", 0.2046, 0.2, "%", "<=", False, "", compared=True)
     assert _judged(one) == "0.205 % FAILED"
     assert _judged(replace(one, value=0.5)) == "0.50 % FAILED"
+    assert _judged(replace(one, value=math.nan, passed=None)) == "no value, not judged"
 
 
 def test_books_are_named_and_limits_marked() -> None:

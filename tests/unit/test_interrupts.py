@@ -133,12 +133,14 @@ def test_an_interrupted_variant_interrupts_its_sweep(
     assert [one.outcome for one in ended] == ["interrupted"]
 
 
-def test_a_hang_up_that_is_ignored_stays_ignored() -> None:
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT])
+def test_a_signal_that_is_ignored_stays_ignored(number: signal.Signals) -> None:
+    """As under nohup, and in the background of a script."""
+    signal.signal(number, signal.SIG_IGN)
     interrupts.install(several_ranks=False)
     with Phase(MPI.COMM_SELF, "nothing was done", "nothing was written"):
-        os.kill(os.getpid(), signal.SIGHUP)
-    assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        os.kill(os.getpid(), number)
+    assert signal.getsignal(number) == signal.SIG_IGN
 
 
 def test_what_a_terminal_sends_twice_is_one_wish() -> None:

@@ -280,6 +280,9 @@ def test_a_short_search_is_checked_on_the_whole_stretch() -> None:
     # What was assigned holds, also where the [test] table has another value.
     assert searched.line.n_spans == checked.line.n_spans == 26
     assert searched.train.speed_km_h == 290.0
+    # Of a case that is short already nothing is whole.
+    task = task_of(variables=variables, search={"short": True})
+    assert "[test]" not in " ".join(study.make_plan(case.shortened(), task).warnings)
 
 
 # --- variables -----------------------------------------------------------------------------------
@@ -502,6 +505,24 @@ def test_what_is_shipped_bounds_what_gets_worse(of: str, by: float, evaluated: A
         task_of(objective={"speeds_km_h": [230.0]})
 
 
+@pytest.mark.parametrize("shipped", [20.0, -20.0])
+def test_a_share_of_what_is_negative_is_worse_by_as_much(shipped: float, evaluated: Any) -> None:
+    """A kilogram lowers the least force by 1 N; 0.9 of 20 N and of -20 N allow 2 N less."""
+
+    def formula(scene: Scene) -> dict[str, Any]:
+        d = masses(scene)[0] - 7.2
+        return summary(30.0 - d, min_N=shipped - d)
+
+    evaluated(formula)
+    task = task_of(
+        set=FORWARD,
+        variables=[{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}],
+        constraints=[{"statistic": "min_N", "at_least": 0.9, "of_shipped": "each"}],
+    )
+    (found,) = study.optimise(study.make_plan(draft(), task))
+    assert found.values[HEAD][0] == pytest.approx(7.2 + 2.0, abs=1e-3)
+
+
 def test_a_search_may_be_coarser_than_its_checks() -> None:
     task = task_of(
         set=FORWARD,
@@ -559,15 +580,19 @@ def test_what_gets_worse_is_told() -> None:
 
 
 def test_the_verb_writes_what_it_says(tmp_path: Path, evaluated: Any) -> None:
-    evaluated(lambda scene: summary(20.0 + (masses(scene)[0] - 8.0) ** 2))
+    def formula(scene: Scene) -> dict[str, Any]:
+        assert scene.line.n_spans == 16  # of its [test] table
+        return summary(20.0 + (masses(scene)[0] - 8.0) ** 2)
+
+    evaluated(formula)
     file = tmp_path / "task.toml"
     file.write_text(
         f'[[variables]]\nkey = "{HEAD}"\nentries = [[1]]\nchange = [-5.0, 5.0]\n'
         "[checks]\nn_seeds = 0\n"
     )
-    words = ["optimise", "en50318_2002", str(file), "-o", str(tmp_path / "out")]
+    words = ["optimise", "en50318_2002", str(file), "-o", str(tmp_path / "out"), "--short"]
     for key, value in TINY.items():
-        words += ["--set", f"{key}={value}"]
+        words += ["--set", f"{key}={value}"] if key != "line.n_spans" else []
     done = invoke(*words)
     assert done.exit_code == 0, done.output
     assert "one speed and one train" in done.output

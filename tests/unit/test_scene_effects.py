@@ -56,8 +56,8 @@ def test_an_effect_without_what_it_requires_is_refused(name: str) -> None:
 
 # Effects whose own checks say what they lack, and how their sentences begin.
 OWN_SENTENCE = {
-    "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio is 0 in ",
-    "contact_damping": "contact.damping_N_s_per_m is 0 N s/m in ",
+    "residual_dropper_stiffness": "line.dropper.residual_stiffness_ratio is 0 by default",
+    "contact_damping": "contact.damping_N_s_per_m is 0 N s/m by default",
     "axial_motion": "effects.axial_motion is on, but line.contact_wire (contact wire) in ",
 }
 # Without anything that an optional effect could act on but slack droppers and the contact's loss.
@@ -207,7 +207,11 @@ ON, RATIOS = (
     ("case", "changes", "says"),
     [
         ("conductor_rail", [ON], r"effects.residual_dropper_stiffness is true on .* no droppers"),
-        (EXAMPLE, [ON], "line.links.0.residual_stiffness_ratio is 0 in .* needs a value greater"),
+        (
+            EXAMPLE,
+            [ON],
+            "line.links.0.residual_stiffness_ratio is 0 by default.* needs a value greater",
+        ),
         (EXAMPLE, RATIOS, "line.links.0.residual_stiffness_ratio is 0.1 on .* acts only with"),
         (EXAMPLE, [*RATIOS, "effects.residual_dropper_stiffness=false"], ""),
         (EXAMPLE, [*RATIOS, ON], ""),

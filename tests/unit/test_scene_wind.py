@@ -69,6 +69,12 @@ def test_in_still_air_nothing_is_told_of_cross_wind() -> None:
     assert "cross wind" not in line
 
 
+def test_a_factor_of_cross_wind_without_wind_is_refused() -> None:
+    load_scene("windy_viaduct", [CALM, f"{FACTOR}=0.5"])  # a variant of a sweep
+    with pytest.raises(InputError, match=r"crosswind_factor is 0\.5 .*; there is no wind: give"):
+        load_scene("windy_viaduct", ["wind=", f"{FACTOR}=0.5"])
+
+
 def test_a_factor_of_cross_wind_without_forces_of_the_air_is_refused() -> None:
     with pytest.raises(InputError, match=r"crosswind_factor is 0\.5 .* has no forces on this"):
         load_scene("ac_simple", [f"{FACTOR}=0.5"])

@@ -11,6 +11,7 @@ import pytest
 from measuring import check
 from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of
 
+from catenary import InputError
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.track import Curve
@@ -92,3 +93,8 @@ def test_a_short_line_rests_as_the_middle_of_a_long_one(lateral: str, what: str)
     assert max(np.abs(height - sound[0]).max(), np.abs(y - sound[1]).max()) > 5e-3
     check("height [m]", height, expected_height, within=1e-9)
     check("to the left [m]", y, expected_y, within=1e-9)
+
+
+def test_a_zig_zag_in_the_wind_is_refused_and_the_wind_named() -> None:
+    with pytest.raises(InputError, match=r"another kind, as the mean wind \(wind\) makes spans"):
+        resting("zig-zag", GOES_ON, 0, windy=True)

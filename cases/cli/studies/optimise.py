@@ -16,6 +16,7 @@ from catenary.cases.cli.app import (
     MoreAssignments,
     Out,
     SceneWords,
+    Shortened,
     print_findings,
     serial_verb,
 )
@@ -39,6 +40,7 @@ class TaskWords:
     out: Out
     extras: MoreAssignments = None
     assignments: Assignments = None
+    shortened: Shortened = False
     n_jobs: Jobs = 1
     force: Force = False
 
@@ -48,8 +50,8 @@ class TaskWords:
         from catenary.cases.scene.load import read_draft
 
         def read() -> tuple[Draft, Path]:
-            words = SceneWords(self.case, self.extras, self.assignments)
-            return read_draft(words.case, words.changes), self.task_file
+            words = SceneWords(self.case, self.extras, self.assignments, self.shortened)
+            return read_draft(words.case, words.changes, words.shortened), self.task_file
 
         made = study(
             read,

@@ -71,15 +71,20 @@ def _one_after_the_other(
 
 
 def check_crosswind(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """A factor of cross winds of a pantograph on which the air has no forces."""
+    """A factor of cross winds without a wind, or of a pantograph on which the air has no forces."""
     for name, table in scene.pantographs.items():
-        if table.crosswind_factor and not _meets_air(scene, name) and not scene.origin.recorded:
-            key = f"pantographs.{name}.crosswind_factor"
+        if not table.crosswind_factor or scene.origin.recorded:
+            continue
+        if not _meets_air(scene, name):
             why = (
                 "the air has no forces on this pantograph: give it aerodynamics or a force of type "
-                f"aerodynamic_force{take_away()}"
+                "aerodynamic_force"
             )
-            yield scene.refused(key, why)
+        elif scene.wind is None:
+            why = "there is no wind: give a table wind"
+        else:
+            continue
+        yield scene.refused(f"pantographs.{name}.crosswind_factor", why + take_away())
 
 
 def check_uplift(scene: Scene) -> Iterator[Fault]:

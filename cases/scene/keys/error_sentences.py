@@ -18,12 +18,15 @@ _LONGEST_KEY = 200  # of one in a sentence
 _LONGEST_TAG = 60
 
 
-def refusal(origin: Origin, key: str, value: object, why: str) -> Fault:
+def refusal(
+    origin: Origin, key: str, value: object, why: str, *, by_default: bool = False
+) -> Fault:
     """The fault of a key with its value, the place where it was written, and the reason ``why``."""
     unit = unit_of(key)
     number = f"{value:g}" if isinstance(value, float) else shown(value)
     in_unit = f" {unit}" if unit else ""
-    return Fault(key, f"{key} is {number}{in_unit} {origin.of(key)}; {why}")
+    how = "by default, as it is not given " if by_default else ""
+    return Fault(key, f"{key} is {number}{in_unit} {how}{origin.of(key)}; {why}")
 
 
 def unknown_key(key: str, where: str, known: Sequence[str]) -> str:

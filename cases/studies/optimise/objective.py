@@ -218,7 +218,9 @@ class Problem:
             for speed in np.unique(speeds):
                 own = speeds == speed
                 values[own] = -sign * np.max(-sign * values[own])
-        return bound * values, sign / np.where(values == 0.0, 1.0, np.abs(values))
+        # A share of what is negative goes as far to the same side: -3 may fall by as much as 3 may.
+        bounds = np.where(values < 0.0, 2.0 - bound, bound) * values
+        return bounds, sign / np.where(values == 0.0, 1.0, np.abs(values))
 
     @property
     def _counts(self) -> list[bool]:

@@ -123,6 +123,7 @@ def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
     """
     whole = draft.scene()
     searched = _shortened(draft) if task.search.short else draft
+    is_shortened = searched.raw != draft.raw
     own = [parse_assignment(text, "search.values:") for text in task.search.values]
     searched = searched.assigned((key, value, "in search.values") for key, value in own)
     scenes = _of_any_values(SceneSet(searched, members_of(task.set)).checked())
@@ -136,7 +137,7 @@ def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
                 )
     checks = {name: _of_any_values(own) for name, own in checks_of(draft, task).items()}
     warnings = []
-    if task.search.short:
+    if is_shortened:
         warnings.append(
             "the search runs the case shortened by its [test] table; figures of the optimum are "
             "those of the whole stretch"

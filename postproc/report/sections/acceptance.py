@@ -132,11 +132,8 @@ def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
         for one, label in zip(run.criteria, labels(run.criteria), strict=True)
         if one.passed is not None
     ]
-    shares = [
-        (one, label)
-        for one, label in judged
-        if one.passed and one.limit != 0.0 and not _is_given(one)
-    ]
+    passed = [(one, label) for one, label in judged if one.passed and not _is_given(one)]
+    shares = [(one, label) for one, label in passed if one.limit != 0.0]
     if shares:
         one, label = min(shares, key=lambda pair: abs(_distance(pair[0]) / pair[0].limit))
         share = 100.0 * _distance(one) / abs(one.limit)
@@ -145,6 +142,13 @@ def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
             f"Nearest to its limit{which}: {label}, with a margin of {_margin(one)} {one.unit} "
             f"({number(share, decimals_that_tell(share, 0.0, 1))} %)."
         )
+    without_share: dict[str, str] = {}
+    for one, label in sorted(passed, key=lambda pair: abs(_distance(pair[0]))):
+        if one.limit == 0.0:
+            without_share.setdefault(one.quantity, f"{label} ({_margin(one)} {one.unit})")
+    if without_share:
+        named = ", ".join(without_share.values())
+        yield f"Margins from limits of zero, which have no shares: {named}."
     errors, what = errors_of(run), _SOURCES[bool(run.measured)]
     turned = _turned(judged, errors)
     if turned:

@@ -81,7 +81,7 @@ struct HeadArrays {
     CATENARY_SHAPES("2 s n, 3n")
 };
 
-/// Strips that bend, see mbs/head/flexure.py.
+/// Strips that bend, see mbs/head/strips.py.
 struct Bending {
     SplineTables tables;  ///< of m modes over the place on a strip [m]
     int64_t first;        ///< coordinate of the first strip's first mode, the others behind it

@@ -41,6 +41,8 @@ void extrapolate(Head& head, const py::object& drive, const py::object& early) {
 }  // namespace
 
 void offer_heads(py::module_& module) {
+    offer_records<SplineTables, NewmarkFactors, HeadArrays, Bending, Lowering, Regulation, HeadLaws,
+                  LinearStep, SprungMasses, ReducedMechanism>(module);
     CATENARY_OFFER_TYPE(module, "DRIVE", Drive, time, force, part, base, base_velocity,
                         base_acceleration, roof, roof_velocity, head_air, arm_air, bodies_air);
     CATENARY_OFFER_TYPE(module, "HEAD_LAW", HeadLaw, by_base, zero, of_rate, begin, end);

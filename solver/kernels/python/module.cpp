@@ -34,7 +34,7 @@ void offer_base(py::module_& module) {
 
 void offer_line(py::module_& module) {
     offer_records<Motion, Newmark, Alpha, Columns, Shown, Window, Changing, Sampled, Loads,
-                  MemoryTables, Memories, Cuts>(module);
+                  MemoryTables, Memories, Cuts, Links, Dependents>(module);
     CATENARY_OFFER_TYPE(module, "RESERVE", Reserve, rest, stiffness, damping, place, released,
                         carried);
     offer(module, "predict", predict, "n, n, n, n");

@@ -15,7 +15,7 @@ from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.kernels import native
 from catenary.solver.model.gauges import Gauges, gauges_of
-from catenary.solver.model.switching_links import NO_LINKS, Dependents, LinkArrays, padded
+from catenary.solver.model.switching_links import NO_LINKS, padded, some_of
 from catenary.solver.problem.watched_links import GAUGES
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import ChangedLine
@@ -321,21 +321,21 @@ class Showing:
 
 def _owned_gauges(
     gauges: Gauges, owned: Callable[[np.ndarray], np.ndarray], first: int
-) -> tuple[np.ndarray, dict[str, LinkArrays]]:
+) -> tuple[np.ndarray, dict[str, native.Links]]:
     """Numbers of the gauges that a rank owns, and what they watch in its unknowns."""
     if not gauges.places:
         return np.zeros(0, dtype=np.int64), {}
     mine = np.flatnonzero(owned(gauges.watched[GAUGES[0]].unknowns[:, 0]))
     local = {
-        name: links._replace(unknowns=links.unknowns - first).of(mine)
+        name: some_of(links._replace(unknowns=links.unknowns - first), mine)
         for name, links in gauges.watched.items()
     }
     return mine, local
 
 
 def _further_links(
-    links: FollowedLinks, watched: Mapping[str, LinkArrays]
-) -> tuple[LinkArrays, Dependents, np.ndarray, dict[str, np.ndarray]]:
+    links: FollowedLinks, watched: Mapping[str, native.Links]
+) -> tuple[native.Links, native.Dependents, np.ndarray, dict[str, np.ndarray]]:
     """Owned links of one sign other than droppers, followed by gauges.
 
     Returns them, their bends, an array for their forces [N], and views of that array by the names
@@ -344,11 +344,11 @@ def _further_links(
     shown = {name: links.shown(name)[1:] for name in links.table.components if name != DROPPERS}
     parts = {name: own for name, (own, _) in shown.items()} | dict(watched)
     if not parts:
-        return NO_LINKS, Dependents(NO_LINKS, np.zeros(1, dtype=np.int64)), np.zeros(0), {}
+        return NO_LINKS, native.Dependents(NO_LINKS, np.zeros(1, dtype=np.int64)), np.zeros(0), {}
     counts = [np.diff(bends.begin) for _, bends in shown.values()]
     counts += [np.zeros(part.law.size, dtype=np.int64) for part in watched.values()]
     added = [bends.links for _, bends in shown.values()] or [NO_LINKS]
-    bends = Dependents(_one_after_another(added), np.cumsum(np.concatenate([[0], *counts])))
+    bends = native.Dependents(_one_after_another(added), np.cumsum(np.concatenate([[0], *counts])))
     width = max(part.unknowns.shape[1] for part in parts.values())
     wide = [padded(part, width) for part in parts.values()]
     ends = np.cumsum([part.law.size for part in wide])
@@ -357,5 +357,5 @@ def _further_links(
     return _one_after_another(wide), bends, force, by_name
 
 
-def _one_after_another(parts: list[LinkArrays]) -> LinkArrays:
-    return LinkArrays(*map(np.concatenate, zip(*parts, strict=True)))
+def _one_after_another(parts: list[native.Links]) -> native.Links:
+    return native.Links(*map(np.concatenate, zip(*parts, strict=True)))

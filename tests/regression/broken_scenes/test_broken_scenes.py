@@ -209,7 +209,11 @@ ASSIGNMENTS = {
     "first one trails": (["train.pantographs.0.behind_m=5"], "must be 0"),
     "two in one place": (
         ["train.pantographs.1.name=reference", "train.pantographs.1.behind_m=0"],
-        "at least 1 m more",
+        "train.pantographs.1.behind_m is 0 m on the command line (--set); it must be at least 1 m",
+    ),
+    "two in one place by default": (
+        ["train.pantographs.1.name=reference"],
+        "train.pantographs.1.behind_m is 0 m by default, as it is not given in ",
     ),
     "trailing one outside": (
         ["train.pantographs.1.name=reference", "train.pantographs.1.behind_m=200"],

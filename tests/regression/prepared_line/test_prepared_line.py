@@ -19,6 +19,7 @@ from scenes import Scene, find_case, load_scene
 from studies import few
 
 from catenary import InputError, RunBroken
+from catenary.base.options import command_line
 from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
 from catenary.cases.studies.hard import runs
 from catenary.solver.kernels.native import Simulation
@@ -31,7 +32,7 @@ FEW = (
     *("dropper_curve", "f_planes"),
 )
 REFUSED = {
-    "w_wind": "gusts are made under way, .*wind.gusts=",
+    "w_wind": "gusts are made under way, .* \\(wind.gusts = None in replace",
     "d_incidents": "incidents change the line",
     "n_fixed": "numerics.scheme is not one_solve",
     "n_newmark": "numerics.adaptive_tolerance_N lets steps be halved",
@@ -102,6 +103,11 @@ def test_what_needs_more_than_the_loop_is_refused(name: str, tmp_path: Path) -> 
     with pytest.raises(InputError, match=REFUSED[name]):
         prepare_line(acting_scene(name), tmp_path / "a.line")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_verb_says_how_its_words_take_gusts_away(tmp_path: Path) -> None:
+    with command_line(), pytest.raises(InputError, match=r"take them away \(wind.gusts=\)"):
+        prepare_line(acting_scene("w_wind"), tmp_path / "a.line")
 
 
 @pytest.mark.parametrize("name", ["ac_simple", "dropper_curve", "overlap", "rich_train"])

@@ -7,30 +7,23 @@ import gc
 import numpy as np
 import pytest
 
-from catenary.mbs.head.head_arrays import (
-    HeadArrays,
-    LinearStep,
-    NewmarkFactors,
-    SplineTables,
-    drive_width,
-    named,
-)
+from catenary.mbs.head.head_arrays import drive_width, named
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.kernels import native
 
 DT = 1e-3
-NEWMARK = NewmarkFactors(DT, 0.25 * DT**2, 0.5 * DT, 0.25 * DT**2, 0.5 * DT)
+NEWMARK = native.NewmarkFactors(DT, 0.25 * DT**2, 0.5 * DT, 0.25 * DT**2, 0.5 * DT)
 
 
 def free_mass(mass: float, roll: int = -1) -> tuple[native.Head, np.ndarray, np.ndarray]:
     """A mass of one strip that nothing holds, its state, and what a step of it is asked for."""
     state, out = np.zeros(3), np.zeros(4)
-    arrays = HeadArrays(np.array([[[1.0]], [[0.0]]]), state, out, NEWMARK, roll)
+    arrays = native.HeadArrays(np.array([[[1.0]], [[0.0]]]), state, out, NEWMARK, roll)
     matrix = np.array([[1.0, DT, 0.25 * DT**2], [0.0, 1.0, 0.5 * DT], [0.0, 0.0, 0.0]])
     unit = np.array([0.25 * DT**2, 0.5 * DT, 1.0]) / mass
-    linear = LinearStep(matrix, unit, unit.copy(), np.array([[1.0 / mass]]))
+    linear = native.LinearStep(matrix, unit, unit.copy(), np.array([[1.0 / mass]]))
     return native.LinearChain(arrays, linear), state, out
 
 
@@ -53,7 +46,7 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="other shapes than its strips"):
         free_mass(10.0, roll=1)
     head, *_ = free_mass(10.0)
-    tables = SplineTables(np.array([0.0, 1.0]), np.zeros((1, 3, 4)))
+    tables = native.SplineTables(np.array([0.0, 1.0]), np.zeros((1, 3, 4)))
 
     class TooMany:
         first, wires = 1, 1

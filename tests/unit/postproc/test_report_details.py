@@ -132,9 +132,13 @@ def test_the_nearest_limit_is_the_smallest_share() -> None:
     mean = criterion(147.0, 150.0, "<=", "mean_force")  # 2 %
     largest = criterion(346.5, 350.0, "<=", "force_max")  # 1 %
     zero = criterion(1.0, 0.0, ">", "force_min")  # no share of zero
-    assert told(0.1, mean, largest, zero).startswith(
-        "Nearest to its limit: force_max of the run, with a margin of 3.5 N (1.0 %)."
+    farther = criterion(2.0, 0.0, ">", "force_min")
+    lost = criterion(-1.0, 0.0, ">", "force_stat_min")  # failed
+    assert told(0.1, mean, largest, farther, zero).startswith(
+        "Nearest to its limit: force_max of the run, with a margin of 3.5 N (1.0 %). "
+        "Margins from limits of zero, which have no shares: force_min of the run (1.0 N)."
     )
+    assert "zero" not in told(0.1, mean, lost)
     # A number of the scene stands at its limit on purpose.
     speed = criterion(300.0, 300.0, "<=", "train_speed")
     assert "train_speed" not in told(0.1, mean, speed)

@@ -10,7 +10,7 @@ from catenary.solver.integrators.line_state import LineState, Newmark, Predicted
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
 from catenary.solver.linear.step_operators import ByStations
-from catenary.solver.model.switching_links import RESERVE, LinkArrays
+from catenary.solver.model.switching_links import RESERVE
 
 RNG = np.random.default_rng(11)
 STEPS = Newmark(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
@@ -71,7 +71,7 @@ def compare(
     passes = StationPasses(
         ByStations(product, factors, read, read, answer, 0.0), loads, motion, STEPS
     )
-    links = LinkArrays(ends, RNG.standard_normal(ends.shape), LAWS[: len(ends)])
+    links = native.Links(ends, RNG.standard_normal(ends.shape), LAWS[: len(ends)])
     passes.track_links(links, tension)
     passes.native.step()
     found = motion.displacement, motion.velocity, answer[own], tension
