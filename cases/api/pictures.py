@@ -78,12 +78,12 @@ class Pictures:
                 return fitted(figure)
         raise InputError(f"the run has no picture {name}; it has {', '.join(self.names)}")
 
-    def contact_force(self) -> Figure:
+    def force(self) -> Figure:
         """Contact force of each pantograph along the track, unfiltered and below 20 Hz [N].
 
         Examples
         --------
-        >>> run.plot.contact_force().axes[0].get_ylabel()
+        >>> run.plot.force().axes[0].get_ylabel()
         'contact force [N]'
         """
         return self("contact_force")
@@ -135,11 +135,11 @@ class Pictures:
         """
         return self("droppers")
 
-    def static(self) -> Figure:
+    def at_rest(self) -> Figure:
         """Profile of the contact wire at rest [mm], and elasticity along a span [mm/N].
 
         Examples
         --------
-        >>> figure = run.plot.static()
+        >>> figure = run.plot.at_rest()
         """
         return self("static")

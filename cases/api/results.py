@@ -93,7 +93,7 @@ class Run:
 
         Examples
         --------
-        >>> figure = run.plot.contact_force()
+        >>> figure = run.plot.force()
         """
         # Not kept: a run that no name holds any more closes its file and frees its memory at once.
         return Pictures(lambda: self._results, lambda: self._evaluated)

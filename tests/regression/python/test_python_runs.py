@@ -153,7 +153,7 @@ def test_a_closed_run_says_so(in_memory: catenary.Run, folder: Path) -> None:
     run = catenary.open(folder)
     run.close()
     run.close()
-    reads = (lambda: run.force, lambda: run.uplift, lambda: run.droppers, run.plot.contact_force)
+    reads = (lambda: run.force, lambda: run.uplift, lambda: run.droppers, run.plot.force)
     for read in (*reads, lambda: run.channels, lambda: run.statistics):
         with pytest.raises(catenary.InputError, match="this run is closed"):
             read()
@@ -189,7 +189,7 @@ def test_processes_give_runs_to_each_other(
     assert (own.folder is None) == (kept == "in memory")
     run = copy.deepcopy(own)
     own.close()
-    assert run.uplift.identical(in_memory.uplift) and run.plot.contact_force().axes
+    assert run.uplift.identical(in_memory.uplift) and run.plot.force().axes
 
 
 def test_droppers_and_arms_are_those_of_the_summary(in_memory: catenary.Run) -> None:
@@ -249,7 +249,7 @@ def test_a_folder_is_written_as_the_program_writes_it(
 def test_memory_holds_all_and_the_disk_nothing(scene: catenary.Scene, temporary: Path) -> None:
     run = catenary.run(scene.replace({"train.end_m": 245.0}))
     assert not list(temporary.iterdir())
-    assert run.plot.contact_force().axes and run.folder is None and "in memory" in repr(run)
+    assert run.plot.force().axes and run.folder is None and "in memory" in repr(run)
 
 
 def test_every_picture_that_is_named_can_be_drawn() -> None:
@@ -475,8 +475,13 @@ def test_values_of_all_kinds_reach_their_scenes() -> None:
 
 def test_pictures_are_those_of_the_report(in_memory: catenary.Run) -> None:
     plot = in_memory.plot
-    names = ("contact_force", "histogram", "uplift", "droppers", "static")
-    made = {name: getattr(plot, name)() for name in names}
+    made = {
+        "contact_force": plot.force(),
+        "histogram": plot.histogram(),
+        "uplift": plot.uplift(),
+        "droppers": plot.droppers(),
+        "static": plot.at_rest(),
+    }
     assert set(made) <= set(plot.names)
     # The report of one pantograph has them as a table.
     assert len(plot.statistics().axes[0].patches) == 6 and "statistics" not in plot.names
