@@ -83,9 +83,13 @@ class Curve:
     def upright_part_at(self, x: np.ndarray) -> np.ndarray:
         """Part across the canted plane of a level force to the left at places ``x`` [m], > 0
         upwards, shape as ``x`` [-]."""
-        return np.asarray(np.sign(self.curvature) * np.sin(self.tilt * self.share(x)))
+        return np.sin(self.roll_at(x))
+
+    def roll_at(self, x: np.ndarray) -> np.ndarray:
+        """Cant angle at places ``x`` [m], > 0 where the left rail is low, shape as ``x`` [rad]."""
+        return np.asarray(np.sign(self.curvature) * self.tilt * self.share(x))
 
     def sideways_pull_at(self, x: np.ndarray) -> np.ndarray:
         """Share of a weight that pulls sideways across the canted track at places ``x`` [m], > 0 to
         the left, shape as ``x`` [-]."""
-        return np.sign(self.curvature) * np.tan(self.tilt * self.share(x))
+        return np.tan(self.roll_at(x))

@@ -2,8 +2,9 @@
 
 To first order in the motion (u, w) about a shape z at rest the mean strain of an element of length
 h is e = (u2 - u1) / h + (1 / h) integral of z' w' dx, and of y' v' - c v in the lateral plane, in a
-curve of curvature c. One strain for an element keeps the bar from locking: what bends within it
-does not stretch it. Its tension gains EA e.
+curve of curvature c. Where cant grows by p' a length, the slopes in space are y' + p' z and
+z' - p' y. One strain for an element keeps the bar from locking: what bends within it does not
+stretch it. Its tension gains EA e.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from catenary.meshgen.track import Curve
 from catenary.solver.model import beam
 from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.rest_shape import Equilibrium
 
 # Slopes at rest that differ by less are one, so that like spans have like matrices [-]. What that
 # changes of a stiffness is a share of 1e-11 of EA.
@@ -43,7 +45,7 @@ def strain_rows(model: Model, wire: str) -> np.ndarray:
             bent = slope_rows(length, shape_of(course, slope, pairs))
             rows[:, 2 + 4 * number : 6 + 4 * number] = np.round(bent / _SLOPE) * _SLOPE
         if form.lateral is not None:
-            rows[:, 2:] += np.concatenate(curve_rows(model, wire), axis=1)
+            rows[:, 2:] += np.concatenate(curve_rows(model, wire, form), axis=1)
     return rows
 
 
@@ -56,21 +58,37 @@ def shape_of(course: np.ndarray, slope: np.ndarray, pairs: np.ndarray) -> np.nda
     return np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
 
 
-def curve_rows(model: Model, wire: str) -> tuple[np.ndarray, np.ndarray]:
-    """Strain of elements by deflections across the canted plane of a curve and along it, -c times
-    their means with the parts c of the curvature, (n, 4) each [1/m], [-]: towards the centre a wire
-    is shorter. Zero on straight track."""
-    return rows_in_curve(model.problem.line.curve, model.mesh.x(model.mesh.elements(wire)))
+def curve_rows(model: Model, wire: str, form: Equilibrium | None) -> tuple[np.ndarray, np.ndarray]:
+    """Strain of elements by deflections across the canted plane of a curve and along it, (n, 4)
+    each [1/m], [-]: -c times their means with the parts c of the curvature, as towards the centre a
+    wire is shorter, and what the twist of the track adds in transitions about the shape ``form``.
+    Zero on straight track."""
+    pairs = model.mesh.elements(wire)
+    shapes = np.zeros((2, len(pairs), 4))
+    if form is not None:
+        for number, (_, course, slope) in enumerate(form.planes()):
+            shapes[number] = shape_of(course, slope, pairs)
+    return rows_in_curve(model.problem.line.curve, model.mesh.x(pairs), *shapes)
 
 
-def rows_in_curve(curve: Curve | None, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``curve_rows`` of elements with ends at ``x`` (n, 2) [m]."""
+def rows_in_curve(
+    curve: Curve | None, x: np.ndarray, z: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """``curve_rows`` of elements with ends at ``x`` (n, 2) [m] and the shapes ``z`` above the track
+    and ``y`` to the left, (n, 4) each, see ``shape_of``."""
     if curve is None:
         return np.zeros((len(x), 4)), np.zeros((len(x), 4))
     middle, length = x.mean(axis=1), np.diff(x, axis=1)
     means = beam.uniform_load(length[:, 0]) / length
-    parts = curve.upright_curvature_at(middle), curve.curvature_at(middle)
-    upright, level = (-part[:, None] * means for part in parts)
+    slopes = np.array([-1.0, 0.0, 1.0, 0.0]) / length
+    # The squares of (z' - p' y) and (y' + p' z), halved, have these parts beside those without p'.
+    twist = np.diff(curve.roll_at(x), axis=1) / length
+    up, aside = ((means * shape).sum(axis=1, keepdims=True) for shape in (z, y))
+    up_slope, aside_slope = ((slopes * shape).sum(axis=1, keepdims=True) for shape in (z, y))
+    upright = twist * ((aside_slope + twist * up) * means - aside * slopes)
+    level = twist * ((twist * aside - up_slope) * means + up * slopes)
+    upright -= curve.upright_curvature_at(middle)[:, None] * means
+    level -= curve.curvature_at(middle)[:, None] * means
     return upright, level
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from catenary.solver.model import beam, exact_beam
 from catenary.solver.model.axial_elements import curve_rows
 from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.wind.wind_at import mean_load
 
 _LEVEL = ("v", "theta_z")
@@ -44,10 +45,12 @@ def dead_loads(model: Model) -> np.ndarray:
     return load
 
 
-def curve_load(model: Model) -> np.ndarray:
+def curve_load(model: Model, form: Equilibrium | None) -> np.ndarray:
     """Pull of the tension of the installation towards the centre of a curve, (n_dofs,) [N], [N m],
     of lines with lateral motion. A course y across a track of curvature c has the curvature
-    y'' + c in plan, of which a canted plane has a part across itself."""
+    y'' + c in plan, of which a canted plane has a part across itself; where the track twists, a
+    course that is straight relative to it is not straight in space, about the shape ``form``,
+    None where none is known yet."""
     load = np.zeros(model.n_dofs)
     if model.problem.line.curve is None or not model.simulated.lateral:
         return load
@@ -56,7 +59,7 @@ def curve_load(model: Model) -> np.ndarray:
         level, _ = wire_elements(model, wire.name, _LEVEL)
         middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
         pull = wire.tension_at(middle) * length
-        for dofs, rows in zip((upright, level), curve_rows(model, wire.name), strict=True):
+        for dofs, rows in zip((upright, level), curve_rows(model, wire.name, form), strict=True):
             np.add.at(load, dofs, -pull[:, None] * rows)
     return load
 

@@ -98,7 +98,9 @@ def _curve(rng: random.Random, words: Words) -> None:
     if rng.random() < 0.5:
         begin, end = sorted(rng.uniform(0.0, places[-1]) for _ in range(2))
         words["line.curve.from_m"], words["line.curve.to_m"] = begin, end + 1.0
-        words["line.curve.transition_m"] = rng.uniform(0.0, 0.49) * (end - begin)
+        transition = rng.uniform(0.0, 0.49) * (end - begin)
+        words["line.curve.transition_m"] = transition
+        words["line.curve.cant_mm"] = min(float(str(words["line.curve.cant_mm"])), 10 * transition)
 
 
 def _sway(rng: random.Random, words: Words) -> None:

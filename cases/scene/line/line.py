@@ -68,6 +68,12 @@ class CurveTable(Table):
                 f"must end behind both transitions: to_m ({self.to_m:g}) must be greater than "
                 f"{self.from_m + 2.0 * self.transition_m:g} m"
             )
+        # Four times what standards allow; over a shorter length a canted plane leaves its wires.
+        if self.cant_mm > 10.0 * self.transition_m:
+            raise ValueError(
+                f"takes cant_mm ({self.cant_mm:g}) with a transition_m of "
+                f"{self.cant_mm / 10.0:g} m or more: cant may grow by no more than 10 mm a metre"
+            )
         return self
 
 

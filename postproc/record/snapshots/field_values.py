@@ -130,9 +130,11 @@ class FieldValues:
             yield (UP, SLOPE), at_rest, np.zeros((nodes.size - 1, 4))
             return
         ends = np.stack([x[:-1], x[:-1] + length], axis=1)
-        upright, level = rows_in_curve(self._curve, ends)
+        aside = self._lateral.y, self._lateral.slope
+        shapes = (_ends(*(part[None, nodes] for part in plane))[0] for plane in (at_rest, aside))
+        upright, level = rows_in_curve(self._curve, ends, *shapes)
         yield (UP, SLOPE), at_rest, upright
-        yield (ASIDE, TURN), (self._lateral.y, self._lateral.slope), level
+        yield (ASIDE, TURN), aside, level
 
     def _bending_moment(self, block: Block, known: Gathered) -> np.ndarray:
         nodes = block.nodes

@@ -19,7 +19,7 @@ import numpy as np
 from catenary.meshgen.hardware import SteadyArm
 from catenary.meshgen.wires import Wire
 from catenary.solver.model import beam
-from catenary.solver.model.axial_elements import curve_rows, shape_of
+from catenary.solver.model.axial_elements import rows_in_curve, shape_of
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.rest_shape import Equilibrium
 
@@ -156,9 +156,8 @@ class _Wire:
         for plane, course, slope in known.planes():
             dofs, _ = wire_elements(model, wire.name, plane)
             self._planes.append((dofs, shape_of(course, slope, pairs)))
-        # Without lateral motion no curve acts.
-        lateral = len(self._planes) > 1
-        self._curved = curve_rows(model, wire.name) if lateral else (np.zeros((len(pairs), 4)),)
+        self._curve, self._ends = model.problem.line.curve, ends
+        self._curved = self._in_curve(np.zeros(model.n_dofs))
         self._along = model.dofs(pairs, "u") if "u" in model.unknowns else None
         self._had = known.gained_tension.get(wire.name, np.zeros(len(pairs)))
         if self._along is not None:
@@ -173,9 +172,11 @@ class _Wire:
             return self._had
         first, second = moved[self._along].T
         strain = (second - first) / self._length - self._grown
+        curved = self._in_curve(0.5 * moved)
         for number, (dofs, shape) in enumerate(self._planes):
             bent = moved[dofs]
-            strain += (self._rows(number, shape + 0.5 * bent) * bent).sum(axis=1)
+            rows = self._slope_rows(shape + 0.5 * bent) + curved[number]
+            strain += (rows * bent).sum(axis=1)
         return np.asarray(self._had + self._axial * strain)
 
     def add_pull(self, total: np.ndarray, moved: np.ndarray) -> None:
@@ -185,21 +186,32 @@ class _Wire:
         if self._along is not None:
             np.add.at(total, self._along, np.stack([-more, more], axis=1))
         other = (self._other_tension + more) * self._length
+        curved = self._in_curve(moved)
         for number, (dofs, shape) in enumerate(self._planes):
             bent = moved[dofs]
             pull = np.einsum("nij,nj->ni", self._linear, bent)
             if self._other_bending is not None:
                 pull += np.einsum("nij,nj->ni", self._other_bending, shape)
             if other.any():
-                pull += other[:, None] * self._rows(number, shape)
+                pull += other[:, None] * (self._slope_rows(shape) + self._curved[number])
             if gained.any():
                 pull += gained[:, None] * np.einsum("nij,nj->ni", self._taut, bent)
+            # Where the track twists each plane sees what has moved in the other one.
+            taut = (self._tension + gained) * self._length
+            pull += taut[:, None] * (curved[number] - self._curved[number])
             np.add.at(total, dofs, pull)
 
-    def _rows(self, plane: int, shape: np.ndarray) -> np.ndarray:
-        """Derivatives of the mean strain by the unknowns of a plane in a shape, (n, 4)."""
-        rows = np.einsum("nij,nj->ni", self._taut, shape) / self._length[:, None]
-        return np.asarray(rows + self._curved[plane])
+    def _slope_rows(self, shape: np.ndarray) -> np.ndarray:
+        """Derivatives of the mean strain by the unknowns of a plane in a shape, (n, 4), on straight
+        track."""
+        return np.asarray(np.einsum("nij,nj->ni", self._taut, shape) / self._length[:, None])
+
+    def _in_curve(self, moved: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What a curve adds to them in each plane, (n, 4); nothing without lateral motion."""
+        if len(self._planes) == 1:
+            return (np.zeros((len(self._ends), 4)),)
+        shapes = (shape + moved[dofs] for dofs, shape in self._planes)
+        return rows_in_curve(self._curve, self._ends, *shapes)
 
 
 class _Arms:

@@ -128,21 +128,21 @@ def _cut(
     apart, stretched = length, np.zeros(length.size)
     hanging: _HangingWires | None = None
     model: Model | None = None
-    lateral: LateralShape | None = None
+    form: Equilibrium | None = None
     close = _FORCE_TOLERANCE * max(wire.tension for wire in problem.line.wires)
     noise, slackest = _noise(problem, mesh), min(wire.tension for wire in problem.line.wires)
     give = float(np.diff(problem.line.support_positions).max()) / (4.0 * slackest)
     for _ in range(_MAX_PASSES):
         model = build(problem, mesh, length, before=model, apart=True)
         hanging = hanging or _HangingWires(model, exact)
-        form = hanging.at_rest(model, lateral)
-        lifted = lateral is not None and bool(lateral.arm_force[:, 1].any())
+        before = None if form is None else form.lateral
+        form = hanging.at_rest(model, form)
+        lifted = before is not None and bool(before.arm_force[:, 1].any())
         _check(problem.line, mesh, form, pushing, lifted)
-        still_lifted, before = 0.0, lateral
+        still_lifted = 0.0
         if model.simulated.lateral:
-            form = _with_lateral(model, form, hanging.moments)
-            lateral = form.lateral
-            still_lifted = _most_change(before, lateral)
+            form = _with_lateral(model, replace(form, lateral=before), hanging.moments)
+            still_lifted = _most_change(before, form.lateral)
         distance = np.linalg.norm(form.dropper_vectors(mesh.droppers), axis=1)
         stretch = distance - form.dropper_length
         # Less what round-off of forces moves droppers, and wires between masts, by.
@@ -179,7 +179,7 @@ def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
 
 
 def _with_lateral(model: Model, form: Equilibrium, moments: np.ndarray | None) -> Equilibrium:
-    """The equilibrium with its lateral plane, in which droppers may lean."""
+    """The equilibrium with its lateral plane, in which droppers may lean, from one before."""
     shape = lateral_shape(model, form, moments)
     form = replace(form, lateral=shape)
     vectors = form.dropper_vectors(model.mesh.droppers)
@@ -232,20 +232,20 @@ class _HangingWires:
         forces = rows, columns, sign
         self._factor = BandedFactors(parts, self._given, heights, forces, n)
 
-    def at_rest(self, model: Model, lateral: LateralShape | None) -> Equilibrium:
-        """The line at rest under the weights of ``model``, which may differ in them only, and
-        under what arms lift of their own in the lateral plane."""
+    def at_rest(self, model: Model, before: Equilibrium | None) -> Equilibrium:
+        """The line at rest under the weights of ``model``, which may differ in them only, and under
+        what arms lift of their own and a twist of the track pulls in the shape ``before``."""
         mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
         load = self._spring_load - self._factor.from_given
-        dead = dead_loads(model) + curve_load(model)
+        dead = dead_loads(model) + curve_load(model, before)
         if self.moments is not None:
             dead += self.moments
         load[self._w] += dead[model.dofs(every)]
         load[self._w + 1] += dead[model.dofs(every, "theta_y")]
         holding = _holding(model)
-        if lateral is not None:
+        if before is not None and before.lateral is not None:
             at = self._w[mesh.steady_arms[~holding]]
-            np.add.at(load, at, lateral.arm_force[~holding, 1])
+            np.add.at(load, at, before.lateral.arm_force[~holding, 1])
         solution, held_by = self._solve(load)
         height, slope = solution[self._w], solution[self._w + 1]
         n = mesh.droppers.shape[0]

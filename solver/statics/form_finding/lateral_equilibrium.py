@@ -56,7 +56,7 @@ def lateral_shape(
     parts = wire_parts(model, at, exact=moments is not None) + clamp_parts(model, at)
     parts.append(springs_between(at[mesh.droppers], form.dropper_force / rise))
     stiffness, load = summed(parts, n).tocsr(), np.zeros(n)
-    every, pulls = np.arange(mesh.n_nodes), dead_loads(model) + curve_load(model)
+    every, pulls = np.arange(mesh.n_nodes), dead_loads(model) + curve_load(model, form)
     if moments is not None:
         pulls += moments
     load[at], load[at + 1] = pulls[model.dofs(every, "v")], pulls[model.dofs(every, "theta_z")]
