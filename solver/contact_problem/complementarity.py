@@ -238,6 +238,7 @@ class InnerProblem:
         always = np.zeros(size, dtype=bool)
         always[:n] = self.law.pulls
         behind = np.zeros(size, dtype=np.int64)
-        system = np.zeros((size, size)), *np.zeros((2, size))
-        self.unknowns = native.Unknowns(always, behind, *system, room_for(size))
+        right, solution = np.zeros((2, size))
+        matrix, room = np.zeros((size, size)), room_for(size)
+        self.unknowns = native.Unknowns(always, behind, matrix, right, solution, room)
         self._bound_to = None, None

@@ -15,7 +15,7 @@ from catenary.meshgen.mesh import DROPPERS, LineMesh
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.film.snapshots import Snapshots
 from catenary.solver.model.matrices import whole_matrix
-from catenary.solver.model.switching_links import switching_links
+from catenary.solver.model.switching_links import some_of, switching_links
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.waves.excitation import Excitation, MovingForce
 
@@ -272,7 +272,7 @@ class EnergyMotion:
         table = switching_links(model, rest.form.dropper_force)
         owner = np.where(table.bent < 0, np.arange(table.bent.size), table.bent)
         mine = np.isin(owner, table.of_component(DROPPERS)) & ~table.is_dependent & ~table.broken
-        self._links = table.arrays.of(mine & (table.arrays.law["released"] > 0.0))
+        self._links = some_of(table.arrays, mine & (table.arrays.law["released"] > 0.0))
         self._link_stretch = self._stretch[self._links.unknowns[:, 0]]
         self._before: tuple[float, np.ndarray] | None = None
         self._times: list[float] = []
