@@ -70,6 +70,7 @@ NOT_AT_REST = (
     "would be slack at",
     "would have a length of",
     "finds no rest",
+    "above its place at the installation",
     "is periodic, which repeats",
     "is periodic, but this line cannot go on",
     "which is steeper than 60 degrees",
