@@ -39,8 +39,10 @@ def refuse_different(comm: Any, *given: object) -> None:
     Collective. ``given`` has texts that tell of its values. Different scenes would wait for each
     other without end, or mix.
     """
+    if comm.size == 1:
+        return
     own = blake2b(repr(given).encode(errors="replace")).digest()
-    if comm.size > 1 and len(set(comm.allgather(own))) > 1:
+    if len(set(comm.allgather(own))) > 1:
         raise InputError(
             "the processes of mpirun do this together, but differ in scene, values or folder: "
             "give all the same, or comm=MPI.COMM_SELF for one of each process's own"

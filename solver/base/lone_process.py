@@ -33,16 +33,17 @@ def settings() -> Iterator[None]:
     Variables that the environment already sets keep their values. Those set here, and what MPI adds
     of its own, are removed afterwards: a process started later may be a launcher.
     """
-    is_launched = launched_by_mpirun()
-    own = {} if is_launched else SETTINGS
-    added = {name: value for name, value in own.items() if name not in os.environ}
+    if launched_by_mpirun():
+        yield
+        return
+    added = {name: value for name, value in SETTINGS.items() if name not in os.environ}
     os.environ.update(added)
     try:
         yield
     finally:
         for name in added:
             del os.environ[name]
-        for name in () if is_launched else _LEFT:
+        for name in _LEFT:
             if name not in os.environ:
                 os.unsetenv(name)  # which the process's own environment has, unlike os.environ
 
