@@ -9,7 +9,6 @@ import numpy as np
 
 from catenary.base.mpi import MPI
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.contacts import no_sideways
 from catenary.solver.contact.followed_links import FollowedLinks, LinkCoupling
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.integrators.line_integrator import LineIntegrator
@@ -152,7 +151,7 @@ class ForcesOnLine:
         n, n_local = candidates.place.size, line.ownership.n_local
         self._across = WiresAcross(comm, across)
         self._moves_across = across.size > 0
-        sideways = no_sideways()
+        sideways = _no_sideways()
         if self._moves_across:
             sideways = sideways_of(model, form, wires, line.ownership)
         self.contacts = native.Contacts(
@@ -286,3 +285,9 @@ def _columns_of_nodes(
     places = dofs, free[dofs].astype(float), wires.x[chosen]
     found = columns_of(line.responses, line.operators.in_pieces, places, put)
     return found.data, found.reach
+
+
+def _no_sideways() -> native.Sideways:
+    """Lateral data of a line without lateral motion, empty."""
+    nothing = np.zeros((0, 2))
+    return native.Sideways(nothing.astype(np.int64), nothing.astype(bool), nothing)

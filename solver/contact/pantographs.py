@@ -24,7 +24,6 @@ from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.contacts import no_work
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw
@@ -171,7 +170,7 @@ class Pantographs:
         self._heads = Heads(self.n_contacts)
         numerics = problem.numerics
         gamma = numerics.gamma if numerics.integrator == "newmark" else 0.5
-        self.work = no_work(self.n_contacts, gamma, numerics.dt)
+        self.work = _no_work(self.n_contacts, gamma, numerics.dt)
         self.across = np.zeros((3, self.n_contacts if simulated.lateral else 0))
         self.lateral_displacement = self.across[2]
         self.lateral_place = np.zeros(self.lateral_displacement.size)
@@ -452,3 +451,14 @@ def nominal_height_rule(
         return mean + above
 
     return height
+
+
+def _no_work(n_contacts: int, share_after: float, dt: float) -> native.ContactWork:
+    """Work of ``n_contacts`` contact forces before the first step of ``dt`` [s].
+
+    ``share_after`` is the weight of the force at the end of a step [-], 1 less that at its start.
+    """
+    local, value = np.zeros((n_contacts, 4), dtype=np.int64), np.zeros((n_contacts, 4))
+    force, before, ahead = np.zeros((3, n_contacts))
+    shares = 1.0 - share_after, share_after
+    return native.ContactWork(np.zeros(1), force, local, value, before, ahead, *shares, dt)
