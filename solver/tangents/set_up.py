@@ -8,7 +8,7 @@ further approximation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -32,10 +32,6 @@ from catenary.solver.problem.contact_laws import HertzLaw
 from catenary.solver.problem.problem import Numerics, steps_of
 from catenary.solver.statics.line_at_rest import LineAtRest
 
-# Weights of a derivative of the fourth order by values at -2, -1, 1 and 2 steps, and of one of the
-# second order, which is exact for what is linear.
-STENCIL: Mapping[int, float] = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
-CENTRAL: Mapping[int, float] = {-1: -0.5, 1: 0.5}
 # Numbers that differ by so many roundings of themselves are equal.
 _ROUNDINGS = 64.0 * float(np.finfo(float).eps)
 # Damping is proportional if no more than such a part of it is not.
@@ -83,7 +79,7 @@ class SetUp:
 
 class StepChange(NamedTuple):
     """The derivative of a pantograph's step: of a linear chain ``arrays``, empty if it does not
-    change; of others models ``beside`` it in the order of differences, ``step`` apart."""
+    change; of others models ``beside`` it, with the parameter a ``step`` lower and higher."""
 
     arrays: native.LinearStep
     beside: Sequence[SteppedHead]
@@ -226,17 +222,11 @@ def _fixed_of(
     }
 
 
-def differentiate(
-    set_up: Callable[[float], SetUp],
-    now: SetUp,
-    step: float,
-    what: str,
-    stencil: Mapping[int, float] = STENCIL,
-) -> Change:
-    """Derivatives of a set-up by a parameter. Not collective.
+def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, what: str) -> Change:
+    """Derivatives of a set-up by a parameter, as central differences. Not collective.
 
-    The error of differences of the fourth order is some step^4 of the set-up's fifth derivative
-    and the round-off of the set-up over the step.
+    Their error is a sixth of step^2 of the set-up's third derivative, and the round-off of the
+    set-up over the step.
 
     Parameters
     ----------
@@ -245,20 +235,17 @@ def differentiate(
     now : SetUp
         The set-up of the march.
     step : float
-        Change of the parameter; set-ups are taken one and two changes to either side.
+        Change of the parameter to either side.
     what : str
         Name of the parameter, for messages.
-    stencil : mapping of int to float, optional
-        Weights of set-ups by numbers of changes; ``CENTRAL`` for a parameter in which the set-up is
-        linear but for heads, whose mean height it changes little.
 
     Raises
     ------
     InputError
         If the parameter changes a part of the set-up without derivative, such as the mesh.
     """
-    found = {number: set_up(number * step) for number in stencil}
-    for other in found.values():
+    below, above = sides = set_up(-step), set_up(step)
+    for other in sides:
         for name, values in now.fixed.items():
             mine = other.fixed[name]
             if mine.shape != values.shape or not np.allclose(mine, values, rtol=1e-9, atol=1e-9):
@@ -267,7 +254,7 @@ def differentiate(
                 )
 
     def of(part: Callable[[SetUp], Any]) -> np.ndarray:
-        return derivative({n: np.asarray(part(own)) for n, own in found.items()}, step)
+        return derivative(np.asarray(part(below)), np.asarray(part(above)), step)
 
     def or_none(values: np.ndarray) -> np.ndarray:
         """Without rows where nothing changes."""
@@ -276,7 +263,7 @@ def differentiate(
     def of_head(number: int) -> StepChange:
         linear = now.heads[number]
         if not isinstance(linear, native.LinearStep):
-            models = [found[side].heads[number] for side in stencil]
+            models = [side.heads[number] for side in sides]
             beside = [model for model in models if isinstance(model, SteppedHead)]
             return StepChange(_NO_STEP, beside, step)
         parts = [
@@ -298,12 +285,8 @@ def differentiate(
             "or contact wires have an irregular running surface"
         )
     terms: list[MatrixTerm] = []
-    if any(other.matrices is not now.matrices for other in found.values()):
-        terms = _matrices(
-            [{n: one.matrices[i] for n, one in found.items()} for i in range(3)],
-            now.matrices,
-            step,
-        )
+    if any(side.matrices is not now.matrices for side in sides):
+        terms = _matrices(below.matrices, above.matrices, now.matrices, step)
     return Change(
         matrices=terms,
         rest=or_none(of(lambda one: one.rest)),
@@ -319,14 +302,13 @@ def differentiate(
     )
 
 
-def derivative(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:
-    """A derivative of the fourth order.
+def derivative(below: np.ndarray, above: np.ndarray, step: float) -> np.ndarray:
+    """A derivative as a central difference.
 
     Parameters
     ----------
-    values : mapping of int to ndarray
-        What is differentiated, with the parameter changed by each multiple of the step in
-        ``STENCIL`` or ``CENTRAL``; all of one shape.
+    below, above : ndarray
+        What is differentiated, with the parameter a step lower and higher; of one shape.
     step : float
         Step of the parameter.
 
@@ -335,25 +317,23 @@ def derivative(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:
     ndarray
         Of the same shape; zero if the values differ by round-off only.
     """
-    total = sum(_weights(values)[number] * value for number, value in values.items()) / step
-    largest = max(float(np.abs(value).max(initial=0.0)) for value in values.values())
-    if float(np.abs(total).max(initial=0.0)) <= _ROUNDINGS * largest / step:
-        return np.zeros_like(total)
-    return np.asarray(total)
-
-
-def _weights(values: Mapping[int, Any]) -> Mapping[int, float]:
-    return STENCIL if len(values) == len(STENCIL) else CENTRAL
+    change = above - below
+    largest = max(float(np.abs(values).max(initial=0.0)) for values in (below, above))
+    if float(np.abs(change).max(initial=0.0)) <= _ROUNDINGS * largest:
+        return np.zeros_like(change)
+    return np.asarray(change / (2.0 * step))
 
 
 def _matrices(
-    found: Sequence[dict[int, sparse.csc_matrix]], now: Sequence[sparse.csc_matrix], step: float
+    below: Sequence[sparse.csc_matrix],
+    above: Sequence[sparse.csc_matrix],
+    now: Sequence[sparse.csc_matrix],
+    step: float,
 ) -> list[MatrixTerm]:
-    """Derivatives of K, C and M by the parameter.
-
-    ``found`` are K, C and M at several multiples of the parameter's ``step``, ``now`` at its value.
-    """
-    stiffness, damping, mass = (_derivative(matrices, step) for matrices in found)
+    """Derivatives of K, C and M by the parameter, from those a step below and above it."""
+    stiffness, damping, mass = (
+        _derivative(*sides, step) for sides in zip(below, above, strict=True)
+    )
 
     def left_by(shares: Sequence[float]) -> sparse.csc_matrix:
         return damping - shares[0] * stiffness - shares[1] * mass
@@ -369,11 +349,12 @@ def _matrices(
     return [_term(matrix.tocsr(), by) for matrix, *by in terms if matrix.nnz]
 
 
-def _derivative(matrices: dict[int, sparse.csc_matrix], step: float) -> sparse.csc_matrix:
+def _derivative(
+    below: sparse.csc_matrix, above: sparse.csc_matrix, step: float
+) -> sparse.csc_matrix:
     """Derivative of a matrix, zero where its change is round-off of the entry."""
-    total = sum(_weights(matrices)[number] * own for number, own in matrices.items()) / step
-    changed = abs(total) > abs(matrices[1]) * (_ROUNDINGS / abs(step))
-    derivative = total.multiply(changed).tocsc()
+    change = above - below
+    derivative = change.multiply(abs(change) > _ROUNDINGS * abs(above)).tocsc() / (2.0 * step)
     derivative.eliminate_zeros()
     return derivative
 

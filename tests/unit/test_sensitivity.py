@@ -290,7 +290,7 @@ def test_the_usual_parameters_are_those_of_the_train_and_the_line() -> None:
 
 
 def test_a_step_follows_from_the_size_of_a_value() -> None:
-    assert Parameter("line.contact_wire.tension_N", (2e4,)).step == pytest.approx(20.0)
+    assert Parameter("line.contact_wire.tension_N", (2e4,)).step == pytest.approx(6.0)
     assert Parameter("line.dropper.pre_sag_mm", (0.0, 0.0)).step == pytest.approx(0.05)
     assert Parameter("line.damping.beta_per_s", (0.0,)).change == 1.0
     # A conductor rail has some 100 N, of which a kilonewton is no small change.

@@ -15,7 +15,7 @@ from catenary.cases.terminal.terminal_text import elasticity_text
 from catenary.meshgen.wires import Role
 from catenary.postproc.report.study_table import Column, StudyTable
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.tangents.set_up import STENCIL, derivative
+from catenary.solver.tangents.set_up import derivative
 
 _MM = 1e3
 # Half of the last digit of a height's change [mm]: a smaller one is round-off, which has no place.
@@ -60,7 +60,7 @@ def rest_sensitivity_of(
 ) -> RestSensitivity:
     """Differentiate the line of a scene at rest. Not collective.
 
-    Lines at rest with the parameter changed are compared, by differences of the fourth order.
+    Lines at rest with the parameter a little lower and higher are compared.
 
     Parameters
     ----------
@@ -119,9 +119,10 @@ def _derivative(parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest
     """Derivatives of ``_numbers`` per unit of a parameter."""
     if parameter.is_of_train:
         raise InputError(f"{parameter.key} does not change the line at rest")
-    values, taut = {}, at_rest.form.dropper_force > 0.0
-    for number in STENCIL:
-        rest = scenes.rest(parameter, number * parameter.step)
+    taut = at_rest.form.dropper_force > 0.0
+
+    def numbers(by: float) -> np.ndarray:
+        rest = scenes.rest(parameter, by)
         if rest.lift.x.shape != at_rest.lift.x.shape or np.any(rest.lift.x != at_rest.lift.x):
             raise InputError(
                 f"{parameter.key} moves nodes of the mesh, by which the line at rest has no "
@@ -132,8 +133,10 @@ def _derivative(parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest
                 f"{parameter.key} makes a dropper slack or taut at rest, where the line has no "
                 "derivative; take it away"
             )
-        values[number] = _numbers(rest)
-    return derivative(values, parameter.step)
+        return _numbers(rest)
+
+    step = parameter.step
+    return derivative(numbers(-step), numbers(step), step)
 
 
 def along_span(found: RestSensitivity) -> StudyTable:

@@ -67,9 +67,11 @@ _BY_ENTRY = ("masses_kg", "stiffnesses_N_per_m", "dampings_N_s_per_m")
 # by a hundredth.
 _CHANGES = {"mm": 1.0, "m": 1e-3, "kg": 1.0, "km/h": 1.0}
 _CHANGES_OF_FORCES = {"tension_N": 1e3, "force_N": 1.0}
-# Step of the differences by which set-ups are differentiated, in parts of the value: of the fourth
-# order they are off by 4 step^4, some 1e-12, and by round-off over the step, 1e-13 to 1e-10.
-_STEP = 1e-3
+# Step of the central differences by which set-ups are differentiated, in parts of the value. They
+# are off by step^2, some 1e-7 of what bends most, tensions, and by round-off over the step, 1e-9 to
+# 1e-7. In the length of a dropper a set-up is linear, so that round-off alone counts.
+_STEP = 3e-4
+_STEP_OF_SHAPE = 1e-3
 # Of a height of 5 m, which moves laws of pantographs as a whole: a part of it would lead beyond
 # their bends, as a limiter's. In it a set-up is linear, and known to 1e-15 m.
 _STEP_OF_HEIGHT = 1e-6
@@ -131,7 +133,7 @@ class Parameter:
     def step(self) -> float:
         """Step by which it is changed to differentiate set-ups, in its unit."""
         if self.is_of_shape:
-            return max(_STEP * self.size, _STEP_OF_ZERO["mm"])
+            return max(_STEP_OF_SHAPE * self.size, _STEP_OF_ZERO["mm"])
         if self.key.endswith("nominal_height_m"):
             return _STEP_OF_HEIGHT
         if self.size > 0.0:

@@ -21,8 +21,6 @@ from catenary.solver.model.model import same_matrices
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
 from catenary.solver.tangents.set_up import (
-    CENTRAL,
-    STENCIL,
     Change,
     SetUp,
     differentiate,
@@ -138,8 +136,6 @@ def change_by(
         If there is none.
     """
 
-    n_steps, linear = len(now.drives), parameter.is_of_shape
-
     def set_up(by: float) -> SetUp:
         try:
             if parameter.is_of_train:
@@ -152,11 +148,11 @@ def change_by(
                 f"derivative to both sides: {error}"
             ) from error
         # Of a shape that changes no matrix, these are taken over.
-        same = linear and same_matrices(rest.model, at_rest.model)
-        return set_up_of(comm, rest, n_steps, now if same or parameter.is_of_train else None)
+        same = parameter.is_of_shape and same_matrices(rest.model, at_rest.model)
+        same = same or parameter.is_of_train
+        return set_up_of(comm, rest, len(now.drives), now if same else None)
 
-    stencil = CENTRAL if linear else STENCIL
-    return differentiate(set_up, now, parameter.step, parameter.key, stencil)
+    return differentiate(set_up, now, parameter.step, parameter.key)
 
 
 def parts_of(changes: Sequence[Change], at_rest: LineAtRest, now: SetUp) -> Iterator[slice]:

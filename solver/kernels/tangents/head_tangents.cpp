@@ -21,9 +21,6 @@ constexpr double kMoved[] = {1e-4, 1e-2, 1.0}, kDriven = 1.0;
 /// Factor of a smaller change, for laws that bend by more than the part `kBent` in between; a
 /// change below `kNearest` is taken in any case.
 constexpr double kNearer = 1e-2, kBent = 1e-5, kNearest = 1e-3;
-/// Weights of a derivative of the fourth order, and of the second, see set_up.py.
-constexpr double kStencil[] = {1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0},
-                 kCentral[] = {-0.5, 0.5};
 
 }  // namespace
 
@@ -165,12 +162,10 @@ void HeadTangents::step_beside(const HeadChange& change, std::span<const double>
             break;
         }
     }
-    const std::span<const double> weights =
-        change.beside.size() == std::size(kCentral) ? std::span<const double>(kCentral) : kStencil;
     for (size_t side = 0; side < change.beside.size(); ++side) {
         put_state(*change.beside[side], h);
         take_step(*change.beside[side], drive.first(row.size()), h);
-        add_end(*change.beside[side], h, weights[side] / change.step, gaps);
+        add_end(*change.beside[side], h, (side == 0 ? -0.5 : 0.5) / change.step, gaps);
     }
 }
 

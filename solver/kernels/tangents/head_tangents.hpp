@@ -8,8 +8,7 @@ namespace catenary {
 
 /// Derivatives of a head: of its state (3 n,), which goes on with the steps, and of the step
 /// itself. Of a linear chain these are all of its arrays or none; others are made anew with the
-/// parameter two steps below, one below, one above and two above where it is, `step` apart, or only
-/// one below and one above, or not at all.
+/// parameter a `step` lower and a step higher, or not at all.
 struct HeadChange {
     Array2<const double> matrix;
     std::span<const double> by_drive, by_head;
