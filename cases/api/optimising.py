@@ -299,7 +299,7 @@ def _made(
     plan = make_plan(draft, read_task(tables_or_file(task, "task"), model))
     for sentence in plan.warnings:
         warn(sentence)
-    with held_study(folder, alone(), command, force) as (kept, write), workers(n_jobs) as pool:
-        found = find(plan, pool, kept, say)
-        files = write(lambda own: output.write(own, plan, found))
+    with held_study(folder, alone(), command, force) as held, workers(n_jobs) as pool:
+        found = find(plan, pool, held.kept, say)
+        files = held.write(lambda: output.files_of(plan, found))
     return Made(plan, found, files, output)

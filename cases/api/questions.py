@@ -217,9 +217,9 @@ def find_speeds(
     from catenary.cases.studies.questions import highest_speed as question
     from catenary.cases.studies.records import held_study
 
-    with held_study(marching.out, marching.comm, command) as (_, write):
+    with held_study(marching.out, marching.comm, command) as held:
         found = question.find_speeds(marching, scene, speeds, list(criteria), direction)
-        files = write(lambda folder: question.write(folder, found))
+        files = held.write(lambda: question.files_of(found))
     return Answer(question.table_of_criteria(found), question.as_text(found), files)
 
 
@@ -240,12 +240,12 @@ def find_separations(
     from catenary.cases.studies.records import held_study
 
     comm = marching.comm
-    with held_study(marching.out, comm, command) as (_, write):
+    with held_study(marching.out, comm, command) as held:
         found = question.find_separations(marching, scene, distances)
         if not explained:
             return Answer(found.table(), "", [])
         period = on_root(comm, lambda: question.period_in(found, scene), takes_long=True)
-        files = write(lambda folder: question.write(folder, found, period))
+        files = held.write(lambda: question.files_of(found, period))
     return Answer(found.table(), question.as_text(found, period), files)
 
 

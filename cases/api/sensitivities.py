@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.base.lone_process import alone
@@ -131,9 +130,3 @@ class Derivatives:
         table = pd.DataFrame(self.rows.records())
         table.attrs["left_out"] = [f"{key}: {why}" for key, why in self.left_out.items()]
         return table
-
-    def write(self, folder: Path) -> list[Path]:
-        """Write the table into a folder; returns the files. Not collective."""
-        from catenary.postproc.report.study_table import write_files
-
-        return write_files(folder, {self.file: self.rows})

@@ -111,9 +111,9 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
 
     from catenary.base.parallel import launched_by_mpirun
     from catenary.cases.process.petsc_options import as_arguments, start_petsc
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
     from catenary.cases.scene.load import load_scene
+    from catenary.cases.studies.records import held_study
 
     if launched_by_mpirun() and console.world().size > 1:
         raise InputError(
@@ -136,10 +136,10 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
             found = study.measure(options, Path(folder), say, n_jobs=n_jobs)
         files: list[Path] = []
     else:
-        with held(out, comm, f"catenary plan {options.case} --cost"):
+        with held_study(out, comm, f"catenary plan {options.case} --cost") as held:
             refuse_table(out / output.RECORD, force)
             found = study.measure(options, out / _RUNS, say, force, n_jobs)
-            files = [] if found is None else output.write(found, out)
+            files = [] if found is None else held.write(lambda: output.files_of(found))
     if found is None:
         again = "" if out is None else "; the same command continues it"
         console.complain(f"interrupted before all effects were run{again}")

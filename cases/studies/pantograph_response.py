@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,13 +27,7 @@ from catenary.postproc.report.pictures.figures import (
     own_style,
     tidy,
 )
-from catenary.postproc.report.study_table import (
-    Content,
-    StudyTable,
-    file_table,
-    texts_table,
-    write_files,
-)
+from catenary.postproc.report.study_table import Content, StudyTable, file_table, texts_table
 
 # Frequencies for the search of peaks and for the fit.
 N_SEARCHED, N_FITTED = 400, 200
@@ -207,16 +200,14 @@ def fit_error(fit: ChainFit) -> str:
 FILES = ("receptance.csv", "receptance.png", "lumped.toml")
 
 
-def write_study(found: PantographStudy, folder: Path) -> list[Path]:
-    """Write all files and return their paths. Raises ``RunBroken`` if the disk refuses."""
+def files_of(found: PantographStudy) -> dict[str, Content]:
+    """The receptance as table and picture, and the fitted model. Not collective."""
     table, drawn, lumped = FILES
     heads = ("frequency_hz", "receptance_real_m_per_N", "receptance_imag_m_per_N")
     columns = found.range.frequencies(), found.receptance.real, found.receptance.imag
     # The receptance at the head, upward per upward force.
     rows = file_table(heads, np.column_stack(columns).tolist())
-    content: dict[str, Content] = {table: rows, lumped: lumped_toml(found)}
-    content[drawn] = lambda: picture(found)
-    return write_files(folder, content)
+    return {table: rows, lumped: lumped_toml(found), drawn: lambda: picture(found)}
 
 
 @own_style()

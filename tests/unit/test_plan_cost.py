@@ -31,6 +31,7 @@ from catenary.cases.studies.effect_cost.study import (
     size_of,
     switchable_effects,
 )
+from catenary.postproc.report.study_table import write_files
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect
@@ -189,7 +190,7 @@ def test_advice_weighs_cost_against_change() -> None:
 
 
 def test_table_csv_and_json_hold_the_same(found: Costs, tmp_path: Path) -> None:
-    files = output.write(found, tmp_path)
+    files = write_files(tmp_path, output.files_of(found))
     assert [path.name for path in files] == ["cost.csv", "cost.json", "cost.txt"]
     text, record = files[2].read_text(), json.loads(files[1].read_text())
     rows = list(csv.DictReader(files[0].read_text().splitlines()))

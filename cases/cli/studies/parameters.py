@@ -17,6 +17,7 @@ from catenary.cases.cli.app import (
     SceneWords,
     Shortened,
     folder_option,
+    leave,
     serial_verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_table
@@ -70,9 +71,9 @@ def pantograph(
     from catenary.cases.studies.pantograph_response import (
         FILES,
         Range,
+        files_of,
         study,
         study_text,
-        write_study,
     )
 
     over = Range(low, high, points, fit_low).checked()
@@ -80,9 +81,7 @@ def pantograph(
         for name in FILES:
             refuse_table(out / name, force)
     found = study(words.load(), kind, masses, over)
-    console.say(study_text(found))
-    if out is not None:
-        console.say("\n" + "\n".join(str(path) for path in write_study(found, out)))
+    leave(out, study_text(found), lambda: files_of(found))
 
 
 @serial_verb(
@@ -139,9 +138,7 @@ def sensitivity(
         found = rest_derivatives(scene, keys or [], droppers=droppers)
     else:
         found = derivatives(scene, keys or [], droppers=droppers, progress=not console.is_quiet())
-    console.say(found.text)
-    if out is not None:
-        console.say(f"\n{found.write(out)[0]}")
+    leave(out, found.text, lambda: {found.file: found.rows})
     return console.DONE
 
 
@@ -172,7 +169,7 @@ def identify(
     force: Force = False,
 ) -> int:
     """Serial."""
-    from catenary.identifications import identified, task_of, write_identified
+    from catenary.identifications import identified, identified_files, task_of
 
     wanted = task_of(task)
     scene = SceneWords(case, extras, assignments, shortened).scene()
@@ -180,6 +177,5 @@ def identify(
 
     refuse_table(out / PARAMETERS, force)
     found = identified(scene, measured, wanted, console.say)
-    console.say(f"\n{found}\n")
-    console.say("\n".join(map(str, write_identified(found, out))))
+    leave(out, f"\n{found}", lambda: identified_files(found))
     return console.DONE

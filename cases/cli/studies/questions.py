@@ -14,6 +14,7 @@ from catenary.cases.cli.app import (
     RunWords,
     StudyRuns,
     folder_option,
+    leave,
     print_findings,
     records_of,
     serial_verb,
@@ -183,16 +184,14 @@ def what_if(
         return (jobs, changes), options
 
     comm, (jobs, changes), options = runs.begin(read, lambda made: made[0][0].scene)
-    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.records import held_study
 
     with ExitStack() as stack:
         folder = out or stack.enter_context(temporary_folder(comm, "what_if"))
-        stack.enter_context(held(folder, comm, f"catenary what-if {words.case}"))
+        held = stack.enter_context(held_study(out, comm, f"catenary what-if {words.case}"))
         ended = question.run(jobs, folder, comm, options)
         found = on_root(comm, lambda: question.differences(changes, ended, folder), takes_long=True)
-        files = []
-        if out is not None:
-            files = on_root(comm, lambda: question.write(folder, found), takes_long=True)
+        files = held.write(lambda: question.files_of(folder, found))
     print_findings(question.as_text(found), files)
     return console.DONE
 
@@ -220,10 +219,7 @@ def worst(
     console.alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.questions.worst_output import answer_of
     from catenary.postproc.read.results import Results
-    from catenary.postproc.report.study_table import write_files
 
     with Results(folder, records) as results:
         text, tables = answer_of(results, count)
-    console.say(text)
-    if out is not None:
-        console.say("\n" + "\n".join(map(str, write_files(out, tables))))
+    leave(out, text, lambda: tables)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, SceneWords, folder_option, serial_verb
+from catenary.cases.cli.app import Force, SceneWords, folder_option, leave, serial_verb
 from catenary.cases.result_folder.output_folder import (
     refuse_impossible,
     refuse_table,
@@ -175,8 +175,7 @@ def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force
     scenes = scenes or [("", words.load())]
     start_petsc([])
     curves = [window_error.curve_of(name, scene, sizes) for name, scene in scenes]
-    files = window_error.write(out, curves)
-    console.say(window_error.as_text(curves) + "\n" + "\n".join(map(str, files)))
+    leave(out, window_error.as_text(curves), lambda: window_error.files_of(curves))
     return console.DONE
 
 

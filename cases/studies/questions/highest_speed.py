@@ -13,7 +13,6 @@ from dataclasses import replace
 from functools import partial
 from itertools import groupby, product
 from math import ceil, inf, log10
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +30,7 @@ from catenary.cases.studies.sweep.variants import VariedKey
 from catenary.cases.studies.sweep.variants import product as variants_of
 from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, Row, StudyTable, write_files
+from catenary.postproc.report.study_table import Column, Content, Row, StudyTable
 
 KEY = "train.speed_km_h"
 ALL, BOTH = "all criteria", "both"
@@ -408,8 +407,8 @@ def as_text(study: SpeedStudy) -> str:
     return "\n".join([*lines, *remarks_of(study.ended)])
 
 
-def write(folder: Path, study: SpeedStudy) -> list[Path]:
-    """Write tables, record and picture; returns the files. Not collective."""
+def files_of(study: SpeedStudy) -> dict[str, Content]:
+    """Tables, record and picture. Not collective."""
     criteria, runs = table_of_criteria(study), table_of(study.ended)
     record = {
         "case": study.case,
@@ -421,7 +420,7 @@ def write(folder: Path, study: SpeedStudy) -> list[Path]:
         "runs": runs.records(),
     }
     drawn = partial(draw, study)
-    return write_files(folder, {TABLE: criteria, RUNS: runs, RECORD: record, PICTURE: drawn})
+    return {TABLE: criteria, RUNS: runs, RECORD: record, PICTURE: drawn}
 
 
 @figures.own_style()

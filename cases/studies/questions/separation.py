@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from math import floor, inf
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -35,10 +34,10 @@ from catenary.cases.studies.sweep.variants import Variant, text_of
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import (
     Column,
+    Content,
     Row,
     StudyTable,
     remark_lines,
-    write_files,
 )
 
 if TYPE_CHECKING:
@@ -367,9 +366,8 @@ def _stretches(rows: Sequence[Row], name: str) -> str:
     return ", ".join(f"{run[0]:g}-{run[-1]:g}" if len(run) > 1 else f"{run[0]:g}" for run in runs)
 
 
-def write(folder: Path, study: SeparationStudy, period: Period) -> list[Path]:
-    """Write table, record and picture of a study and its ``period``; returns the files. Not
-    collective."""
+def files_of(study: SeparationStudy, period: Period) -> dict[str, Content]:
+    """Table, record and picture of a study and its ``period``. Not collective."""
     table, ranked = study.table(), study.by_deviation
     record = {
         "case": study.case,
@@ -384,7 +382,7 @@ def write(folder: Path, study: SeparationStudy, period: Period) -> list[Path]:
         "rows": table.records(),
     }
     drawn = partial(draw, study, period)
-    return write_files(folder, {TABLE: table, RECORD: record, PICTURE: drawn})
+    return {TABLE: table, RECORD: record, PICTURE: drawn}
 
 
 @figures.own_style()
