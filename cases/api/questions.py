@@ -20,14 +20,13 @@ from catenary.callers import (
     say_on_error_stream,
 )
 from catenary.cases.process.petsc_options import options_of
+from catenary.cases.studies.asked import Distances, Speeds
 from catenary.scenes import SceneLike, checked, draft_of, scene_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from catenary.cases.scene.scene import Scene as Checked
-    from catenary.cases.studies.questions.highest_speed import Speeds
-    from catenary.cases.studies.questions.separation import Distances
     from catenary.cases.studies.sweep.together import Marching
     from catenary.postproc.report.study_table import StudyTable
 
@@ -36,12 +35,12 @@ _PROGRAM = "a study of a Python program"
 
 def highest_speeds(
     scene: SceneLike,
-    slowest: float = 200.0,
-    fastest: float = 360.0,
+    slowest: float = Speeds.slowest,
+    fastest: float = Speeds.fastest,
     out: str | Path | None = None,
     *,
-    step: float = 10.0,
-    within: float = 1.0,
+    step: float = Speeds.step,
+    within: float = Speeds.within,
     criteria: str | Sequence[str] = (),
     direction: str | None = None,
     jobs: int = 1,
@@ -100,7 +99,7 @@ def highest_speeds(
     >>> float(table.highest_km_h[0]), float(table.fails_at_km_h[0])
     (305.0, 310.0)
     """
-    from catenary.cases.studies.questions.highest_speed import TABLE, Speeds
+    from catenary.cases.studies.questions.highest_speed import TABLE
 
     speeds = Speeds(
         number_of(slowest, "slowest"),
@@ -115,11 +114,11 @@ def highest_speeds(
 
 def separations(
     scene: SceneLike,
-    nearest: float = 31.0,
-    farthest: float = 400.0,
+    nearest: float = Distances.nearest,
+    farthest: float = Distances.farthest,
     out: str | Path | None = None,
     *,
-    step: float = 1.0,
+    step: float = Distances.step,
     jobs: int = 1,
     force: bool = False,
     progress: bool = False,
@@ -161,7 +160,7 @@ def separations(
     >>> table.separation_m.tolist()[1:], bool(table.std_trailing_N[2] > table.std_trailing_N[1])
     ([50.0, 90.0], True)
     """
-    from catenary.cases.studies.questions.separation import TABLE, Distances
+    from catenary.cases.studies.questions.separation import TABLE
 
     distances = Distances(
         number_of(nearest, "nearest"), number_of(farthest, "farthest"), number_of(step, "step")

@@ -18,10 +18,10 @@ from verb_runner import invoke
 import catenary
 from catenary import InputError
 from catenary.cases.scene.turned import BACKWARD, FORWARD, turned
+from catenary.cases.studies.asked import Speeds
 from catenary.cases.studies.questions.highest_speed import (
     ALL,
     KEY,
-    Speeds,
     SpeedStudy,
     as_text,
     find_speeds,

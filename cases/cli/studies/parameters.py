@@ -21,6 +21,7 @@ from catenary.cases.cli.app import (
     serial_verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_table
+from catenary.cases.studies.asked import Frequencies
 from catenary.cases.terminal import console
 
 
@@ -33,6 +34,7 @@ from catenary.cases.terminal import console
 )
 def pantograph(
     words: SceneWords,
+    over: Frequencies,
     kind: Annotated[
         str | None,
         typer.Option(
@@ -52,31 +54,17 @@ def pantograph(
             help="Masses of the lumped model, 1 to 3; if absent two, or a lumped pantograph's own.",
         ),
     ] = None,
-    low: Annotated[float, typer.Option("--from", metavar="HZ", help="Lowest frequency.")] = 0.1,
-    high: Annotated[float, typer.Option("--to", metavar="HZ", help="Highest frequency.")] = 25.0,
-    points: Annotated[
-        int, typer.Option("--points", metavar="N", help="Frequencies between them, geometric.")
-    ] = 250,
-    fit_low: Annotated[
-        float,
-        typer.Option(
-            "--fit-from",
-            metavar="HZ",
-            help="Lowest frequency of the fit; below it the response is that of the lift.",
-        ),
-    ] = 0.5,
     force: Force = False,
 ) -> None:
     """Serial."""
     from catenary.cases.studies.pantograph_response import (
         FILES,
-        Range,
         files_of,
         study,
         study_text,
     )
 
-    over = Range(low, high, points, fit_low).checked()
+    over.checked()
     if out is not None:
         for name in FILES:
             refuse_table(out / name, force)

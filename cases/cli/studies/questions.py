@@ -21,6 +21,7 @@ from catenary.cases.cli.app import (
     verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
+from catenary.cases.studies.asked import Distances, Speeds
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -76,18 +77,7 @@ class Direction(StrEnum):
 )
 def speed(
     words: RunWords,
-    slowest: Annotated[
-        float, typer.Option("--from", metavar="KM_H", help="Lowest speed [km/h].")
-    ] = 200.0,
-    fastest: Annotated[
-        float, typer.Option("--to", metavar="KM_H", help="Highest speed [km/h].")
-    ] = 360.0,
-    step: Annotated[
-        float, typer.Option(metavar="KM_H", help="Step of the speeds that are run first [km/h].")
-    ] = 10.0,
-    within: Annotated[
-        float, typer.Option(metavar="KM_H", help="Bisect the speed to this accuracy [km/h].")
-    ] = 1.0,
+    speeds: Speeds,
     criterion: Annotated[
         list[str] | None,
         typer.Option(
@@ -109,10 +99,9 @@ def speed(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.questions.highest_speed import Speeds
     from catenary.questions import find_speeds
 
-    speeds, command = Speeds(slowest, fastest, step, within), f"catenary speed {words.case}"
+    command = f"catenary speed {words.case}"
     marching, scene = _begun(words, "speed.csv", out, speeds.first, runs)
     found = find_speeds(marching, scene, speeds, criterion or [], direction, command)
     print_findings(str(found), found.files)
@@ -129,13 +118,7 @@ def speed(
 )
 def separation(
     words: RunWords,
-    nearest: Annotated[
-        float, typer.Option("--from", metavar="M", help="Shortest distance [m].")
-    ] = 31.0,
-    farthest: Annotated[
-        float, typer.Option("--to", metavar="M", help="Longest distance [m].")
-    ] = 400.0,
-    step: Annotated[float, typer.Option(metavar="M", help="Step between distances [m].")] = 1.0,
+    distances: Distances,
     out: Annotated[
         Path | None,
         folder_option("Folder for table and picture; without it nothing is written."),
@@ -144,10 +127,9 @@ def separation(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.questions.separation import Distances
     from catenary.questions import find_separations
 
-    distances, command = Distances(nearest, farthest, step), f"catenary separation {words.case}"
+    command = f"catenary separation {words.case}"
     marching, scene = _begun(words, "separation.csv", out, distances.values, runs)
     found = find_separations(marching, scene, distances, command)
     print_findings(str(found), found.files)

@@ -9,10 +9,9 @@ the first, even division shows, and bisects each of their ends.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from itertools import groupby, product
-from math import ceil, inf, log10
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from catenary.base.options import option
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import BACKWARD, DIRECTIONS, FORWARD, has_mirrored_line, turned
+from catenary.cases.studies.asked import Speeds
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended
 from catenary.cases.studies.sweep.output import DIRECTION, remarks_of, table_of
 from catenary.cases.studies.sweep.together import Marching
@@ -42,59 +42,6 @@ _PANELS = (
     ("min_N", "minimum contact force"),
     ("max_uplift_mm", "contact-wire uplift"),
 )
-# Speeds of the first division at most, and the bounds of a scene's speed [km/h].
-MOST, _SLOWEST, _FASTEST = 2000, 1.0, 1000.0
-# Least distance of two speeds, which are whole multiples of a tenth of it [km/h].
-_CLOSEST = 1e-3
-
-
-class Speeds(NamedTuple):
-    """Speeds that are marched, all [km/h].
-
-    Attributes
-    ----------
-    slowest, fastest : ends of the range
-    step : distance of the first speeds
-    within : how closely ends of stretches are bisected
-    """
-
-    slowest: float = 200.0
-    fastest: float = 360.0
-    step: float = 10.0
-    within: float = 1.0
-
-    def first(self) -> list[float]:
-        """The even division, both ends in it.
-
-        Raises
-        ------
-        InputError
-            If the range is none, or the division too fine.
-        """
-        if not _SLOWEST <= self.slowest < self.fastest <= _FASTEST:
-            raise InputError(
-                f"{option('--from', 'slowest')} {self.slowest:g} {option('--to', 'fastest')} "
-                f"{self.fastest:g} is no range of speeds: give two ascending speeds from "
-                f"{_SLOWEST:g} to {_FASTEST:g} km/h"
-            )
-        step, within = option("--step", "step"), option("--within", "within")
-        if not _CLOSEST <= self.within <= self.step < inf:
-            raise InputError(
-                f"{within} {self.within:g} {step} {self.step:g} is not possible: {within} is at "
-                f"least {_CLOSEST:g} km/h and at most {step}"
-            )
-        count = ceil((self.fastest - self.slowest) / self.step - 1e-9) + 1
-        if count > MOST:
-            raise InputError(
-                f"{step} {self.step:g} makes {count} speeds; at most {MOST} are allowed"
-            )
-        evenly = [round(self.slowest + number * self.step, 4) for number in range(count - 1)]
-        return [*evenly, self.fastest]
-
-    @property
-    def form(self) -> str:
-        """Format of a speed that tells it from the next one, half of ``within`` away or more."""
-        return f".{max(1, ceil(-log10(0.5 * self.within)))}f"
 
 
 class Stretch(NamedTuple):
@@ -412,7 +359,7 @@ def files_of(study: SpeedStudy) -> dict[str, Content]:
     criteria, runs = table_of_criteria(study), table_of(study.ended)
     record = {
         "case": study.case,
-        **{f"{name}_km_h": value for name, value in study.speeds._asdict().items()},
+        **{f"{name}_km_h": value for name, value in asdict(study.speeds).items()},
         "directions": study.directions,
         "one_way": study.one_way,
         "criteria": criteria.records(),

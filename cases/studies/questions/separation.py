@@ -18,15 +18,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
-from math import floor, inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
-from catenary.base.options import option
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.asked import Distances
 from catenary.cases.studies.sweep.jobs import Ended, statistics_of
 from catenary.cases.studies.sweep.output import failed_criteria
 from catenary.cases.studies.sweep.together import Marching
@@ -44,8 +43,6 @@ if TYPE_CHECKING:
     from catenary.cases.studies.waves.theory import WaveTheory
 
 TABLE, RECORD, PICTURE = "separation.csv", "separation.json", "separation.png"
-# Most distances of a study, the bounds of a distance, and the least step between two [m].
-MOST, _LEAST, _FARTHEST, _CLOSEST = 2000, 1.0, 1000.0, 1e-3
 DISTANCE, PLACES = "separation_m", ("leading", "trailing")
 _UPLIFT = "max_uplift_mm"
 _OF_BOTH = (
@@ -58,39 +55,6 @@ _LEAST_FOR_PERIOD = 12  # distances from which a period can be read
 # Curves without a period, of which so many may be explained as well.
 _RANDOM, _AS_WELL = 99, 4
 _MOST_ALIKE = 0.995  # correlation of neighbours, near which a curve has hardly any variance
-
-
-class Distances(NamedTuple):
-    """Distances that are marched: ``nearest``, ``farthest`` and ``step`` between them, all [m]."""
-
-    nearest: float = 31.0
-    farthest: float = 400.0
-    step: float = 1.0
-
-    def values(self) -> list[float]:
-        """The distances, ascending.
-
-        Raises
-        ------
-        InputError
-            If the range is none, or the division too fine.
-        """
-        if not _LEAST <= self.nearest < self.farthest <= _FARTHEST:
-            raise InputError(
-                f"{option('--from', 'nearest')} {self.nearest:g} {option('--to', 'farthest')} "
-                f"{self.farthest:g} is no range of distances: give two ascending ones from "
-                f"{_LEAST:g} to {_FARTHEST:g} m"
-            )
-        step = option("--step", "step")
-        if not _CLOSEST <= self.step < inf:
-            raise InputError(
-                f"{step} {self.step:g} is not possible: it is finite and at least {_CLOSEST:g} m"
-            )
-        length = self.farthest - self.nearest
-        if length / self.step > MOST:
-            raise InputError(f"{step} {self.step:g} makes more than {MOST} distances")
-        count = floor(length / self.step + 1e-9) + 1
-        return [round(self.nearest + number * self.step, 4) for number in range(count)]
 
 
 @dataclass(frozen=True)
