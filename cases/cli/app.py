@@ -152,7 +152,7 @@ class SceneWords:
         """All assignments of a verb that takes no options for PETSc."""
         changes, options = self.split()
         if options:
-            raise InputError(f"{options[0]} after -- is a PETSc option; only run takes those")
+            raise InputError(f"{options[0]} after -- is an option for PETSc; this verb takes none")
         return changes
 
     def draft(self) -> tuple[Draft, list[str]]:

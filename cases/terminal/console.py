@@ -188,6 +188,8 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         try:
             if quiet and kwargs.get("verbose"):
                 raise InputError("--quiet and --verbose exclude each other; give one of them")
+            if kwargs.get("force") and kwargs.get("out", True) is None:
+                raise InputError("--force replaces results in the folder of -o; give both, or none")
             for name, (group, own) in groups.items():
                 kwargs[name] = group(**{field: kwargs.pop(one.name) for field, one in own.items()})
             with command_line():

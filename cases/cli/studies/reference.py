@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     Force,
     Out,
@@ -107,6 +108,8 @@ def judge(
     from catenary.cases.studies.reference.others_results import read_results
 
     found = read_results(files, configuration, not unfiltered)
+    if unfiltered and not any(one.forces for one in found):
+        raise InputError("--unfiltered belongs to forces over time; these files hold statistics")
     leave(out, pages.judged_text(found), lambda: pages.judged_files(found))
     return console.NOT_ACCEPTED if strict and any_failed(pages.rows_of(found)) else console.DONE
 

@@ -102,6 +102,10 @@ def sweep(
     from catenary.sweeps import samples_of
 
     own = None if part is None else parse_part(part)
+    if own is not None and (plotted is not None or histogram):
+        raise InputError(
+            "a part has no pictures: leave --plot and --histogram to the sweep after all parts"
+        )
 
     def read() -> tuple[PlannedSweep, list[str]]:
         draft, options = words.draft()
