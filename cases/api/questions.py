@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.base.lone_process import alone
 from catenary.base.parallel import on_root
@@ -26,7 +25,6 @@ from catenary.scenes import SceneLike, checked, draft_of, scene_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from catenary.cases.scene.scene import Scene as Checked
     from catenary.cases.studies.sweep.together import Marching
     from catenary.postproc.report.study_table import StudyTable
 
@@ -99,6 +97,8 @@ def highest_speeds(
     >>> float(table.highest_km_h[0]), float(table.fails_at_km_h[0])
     (305.0, 310.0)
     """
+    import pandas as pd
+
     from catenary.cases.studies.questions.highest_speed import TABLE
 
     speeds = Speeds(
@@ -108,8 +108,10 @@ def highest_speeds(
         number_of(within, "within"),
     )
     names = listed(criteria, "criteria")
-    with _marching(scene, out, TABLE, speeds.first, jobs, force, progress) as (marching, own):
-        return find_speeds(marching, own, speeds, names, direction).table()
+    speeds.first()
+    with _marching(scene, out, TABLE, jobs, force, progress) as marching:
+        found = find_speeds(marching, speeds, names, direction)
+    return pd.DataFrame(found.table.records())
 
 
 def separations(
@@ -160,13 +162,17 @@ def separations(
     >>> table.separation_m.tolist()[1:], bool(table.std_trailing_N[2] > table.std_trailing_N[1])
     ([50.0, 90.0], True)
     """
+    import pandas as pd
+
     from catenary.cases.studies.questions.separation import TABLE
 
     distances = Distances(
         number_of(nearest, "nearest"), number_of(farthest, "farthest"), number_of(step, "step")
     )
-    with _marching(scene, out, TABLE, distances.values, jobs, force, progress) as (marching, own):
-        return find_separations(marching, own, distances, explained=out is not None).table()
+    distances.values()
+    with _marching(scene, out, TABLE, jobs, force, progress) as marching:
+        found = find_separations(marching, distances, explained=out is not None)
+    return pd.DataFrame(found.table.records())
 
 
 @contextmanager
@@ -174,18 +180,13 @@ def _marching(
     scene: SceneLike,
     out: str | Path | None,
     table: str,
-    check: Callable[[], object],
     jobs: int,
     force: bool,
     progress: bool,
-) -> Iterator[tuple[Marching, Checked]]:
-    """The march of variants of a scene, and the scene itself.
-
-    ``check`` raises InputError if what is asked for is impossible; ``table`` is left in ``out``.
-    """
+) -> Iterator[Marching]:
+    """The march of variants of a scene by a question that leaves a ``table`` in ``out``."""
     from catenary.cases.result_folder.output_folder import refuse_table
 
-    check()
     n_jobs, folder = n_at_once(jobs), folder_of(out)
     if folder is not None:
         refuse_table(folder / table, force)
@@ -196,12 +197,12 @@ def _marching(
 
     say = say_on_error_stream if progress else say_nothing
     with options_of(own.petsc.given()) as petsc, ending_as_python():
-        yield Marching(draft_of(given), folder, comm, RunOptions(force, petsc, say, n_jobs)), own
+        options = RunOptions(force, petsc, say, n_jobs)
+        yield Marching(draft_of(given), own, folder, comm, options)
 
 
 def find_speeds(
     marching: Marching,
-    scene: Checked,
     speeds: Speeds,
     criteria: Sequence[str],
     direction: str | None,
@@ -209,22 +210,20 @@ def find_speeds(
 ) -> Answer:
     """Find the highest speeds, and write files if the marches have a folder.
 
-    ``marching`` marches the variants of the scene, ``command`` says to others that want the folder
-    what this process does; all else, and errors, are those of
-    ``cases.studies.questions.highest_speed.find_speeds``. Collective.
+    ``command`` says to others that want the folder what this process does; all else, and errors,
+    are those of ``cases.studies.questions.highest_speed.find_speeds``. Collective.
     """
     from catenary.cases.studies.questions import highest_speed as question
     from catenary.cases.studies.records import held_study
 
     with held_study(marching.out, marching.comm, command) as held:
-        found = question.find_speeds(marching, scene, speeds, list(criteria), direction)
+        found = question.find_speeds(marching, speeds, list(criteria), direction)
         files = held.write(lambda: question.files_of(found))
-    return Answer(question.table_of_criteria(found), question.as_text(found), files)
+    return Answer(question.as_text(found), question.table_of_criteria(found), files)
 
 
 def find_separations(
     marching: Marching,
-    scene: Checked,
     distances: Distances,
     command: str = _PROGRAM,
     *,
@@ -240,27 +239,18 @@ def find_separations(
 
     comm = marching.comm
     with held_study(marching.out, comm, command) as held:
-        found = question.find_separations(marching, scene, distances)
+        found = question.find_separations(marching, distances)
         if not explained:
-            return Answer(found.table(), "", [])
+            return Answer("", found.table(), [])
+        scene = marching.scene
         period = on_root(comm, lambda: question.period_in(found, scene), takes_long=True)
         files = held.write(lambda: question.files_of(found, period))
-    return Answer(found.table(), question.as_text(found, period), files)
+    return Answer(question.as_text(found, period), found.table(), files)
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Answer to a question, and the files with it. As text what the program prints."""
+class Answer(NamedTuple):
+    """Answer to a question: what the program prints, the table that Python gets, files with it."""
 
-    own: StudyTable
     text: str
+    table: StudyTable
     files: list[Path]
-
-    def table(self) -> pd.DataFrame:
-        """The table that a program gets."""
-        import pandas as pd
-
-        return pd.DataFrame(self.own.records())
-
-    def __str__(self) -> str:
-        return self.text

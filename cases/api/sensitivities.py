@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.base.lone_process import alone
 from catenary.callers import listed, progress_shown
@@ -104,18 +103,14 @@ def rest_derivatives(
     return Derivatives(rest_text(found), along_span(found), AT_REST, found.left_out)
 
 
-@dataclass(frozen=True)
-class Derivatives:
+class Derivatives(NamedTuple):
     """Derivatives of the statistics of a scene, or of its line at rest.
 
     Attributes
     ----------
-    text : str
-        What the program prints.
-    rows : StudyTable
-        The table, which is written as ``file``.
-    left_out : mapping
-        Why there is no derivative by a usual parameter, by its key.
+    text : what the program prints
+    rows, file : the table, and the file that it is written as
+    left_out : why there is no derivative by a usual parameter, by its key
     """
 
     text: str

@@ -28,7 +28,6 @@ from catenary.cases.studies.effect_cost.study import (
     SwitchableEffects,
     jobs_of,
     measure,
-    size_of,
     switchable_effects,
 )
 from catenary.postproc.report.study_table import write_files
@@ -122,7 +121,7 @@ def test_counts_are_those_of_the_model() -> None:
         for one, planes in ((problem, (4,)), (wide, (4, 2, 2))):
             model = build(one, mesh, np.ones(mesh.droppers.shape[0]))
             with RepeatedMarch(MPI.COMM_SELF, line_at_rest(one, mesh), 10, 5) as march:
-                size = size_of(march)
+                size = march.size
                 assert march.step_cost() > 0.0
             assert size.n_unknowns == model.numbering.n_unknowns == sum(planes) // 2 * mesh.n_nodes
             assert size.planes == planes

@@ -62,7 +62,7 @@ class TaskWords:
             warn=console.warn,
             say=console.say,
         )
-        print_findings(str(made), made.files)
+        print_findings(made.text, made.files)
         return console.DONE
 
 

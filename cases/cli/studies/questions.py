@@ -25,31 +25,19 @@ from catenary.cases.studies.asked import Distances, Speeds
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import Job
     from catenary.cases.studies.sweep.together import Marching
 
 
-def _begun(
-    words: RunWords,
-    table: str,
-    out: Path | None,
-    check: Callable[[], object],
-    runs: StudyRuns,
-) -> tuple[Marching, Scene]:
-    """The march of variants of a case, and its scene. Collective.
+def _begun(words: RunWords, table: str, out: Path | None, runs: StudyRuns) -> Marching:
+    """The march of variants of a case by a question that leaves a ``table`` in the folder ``out``.
 
-    Parameters
-    ----------
-    table : that the question leaves in the folder ``out``
-    check : raises InputError if what is asked for is impossible
+    Collective.
     """
 
     def read() -> tuple[tuple[Draft, Scene], list[str]]:
-        check()
         if out is not None:
             refuse_table(out / table, runs.force)
         draft, options = words.draft()
@@ -58,7 +46,7 @@ def _begun(
     comm, (draft, scene), options = runs.begin(read, lambda made: made[1])
     from catenary.cases.studies.sweep.together import Marching
 
-    return Marching(draft, out, comm, options), scene
+    return Marching(draft, scene, out, comm, options)
 
 
 class Direction(StrEnum):
@@ -101,10 +89,10 @@ def speed(
     """Collective."""
     from catenary.questions import find_speeds
 
-    command = f"catenary speed {words.case}"
-    marching, scene = _begun(words, "speed.csv", out, speeds.first, runs)
-    found = find_speeds(marching, scene, speeds, criterion or [], direction, command)
-    print_findings(str(found), found.files)
+    speeds.first()
+    marching, command = _begun(words, "speed.csv", out, runs), f"catenary speed {words.case}"
+    found = find_speeds(marching, speeds, criterion or [], direction, command)
+    print_findings(found.text, found.files)
     return console.DONE
 
 
@@ -129,10 +117,10 @@ def separation(
     """Collective."""
     from catenary.questions import find_separations
 
-    command = f"catenary separation {words.case}"
-    marching, scene = _begun(words, "separation.csv", out, distances.values, runs)
-    found = find_separations(marching, scene, distances, command)
-    print_findings(str(found), found.files)
+    distances.values()
+    marching = _begun(words, "separation.csv", out, runs)
+    found = find_separations(marching, distances, f"catenary separation {words.case}")
+    print_findings(found.text, found.files)
     return console.DONE
 
 

@@ -107,7 +107,6 @@ class SpeedStudy(NamedTuple):
 
 def find_speeds(
     marching: Marching,
-    scene: Scene,
     speeds: Speeds,
     wanted: Sequence[str],
     direction: str | None = None,
@@ -117,7 +116,7 @@ def find_speeds(
     Parameters
     ----------
     marching : of the case
-    scene : of the case, at its own speed
+    speeds : instead of the case's own
     wanted : parts of names of criteria, all criteria if there are none
     direction : "forward" or "backward"; both if None, as far as the scene can be turned
 
@@ -129,7 +128,8 @@ def find_speeds(
     Interrupted
         If a signal came.
     """
-    marched, alike, one_way = _directions(scene, direction)
+    case = marching.scene.case.name
+    marched, alike, one_way = _directions(marching.scene, direction)
     judged = DIRECTIONS if alike else marched
     ended: _Marched = {}
 
@@ -150,7 +150,7 @@ def find_speeds(
         march(more)
     found = tuple(_holds(ended, name, names, judged) for name in (ALL, *names))
     in_order = tuple(ended[place] for place in product(marched, _speeds(ended)))
-    return SpeedStudy(scene.case.name, speeds, marched, one_way, found, tuple(not_judged), in_order)
+    return SpeedStudy(case, speeds, marched, one_way, found, tuple(not_judged), in_order)
 
 
 def _directions(scene: Scene, wanted: str | None) -> tuple[tuple[str, ...], bool, str]:

@@ -102,13 +102,12 @@ class SeparationStudy:
         return StudyTable([*columns, Column("remarks")], self.rows)
 
 
-def find_separations(marching: Marching, scene: Scene, distances: Distances) -> SeparationStudy:
+def find_separations(marching: Marching, distances: Distances) -> SeparationStudy:
     """March one pantograph alone and two at each distance. Collective.
 
     Parameters
     ----------
-    marching : of the case
-    scene : the case, checked; all pantographs are of the kind of its first
+    marching : of the case; all pantographs are of the kind of its first
     distances : between the two pantographs
 
     Raises
@@ -118,7 +117,7 @@ def find_separations(marching: Marching, scene: Scene, distances: Distances) -> 
     Interrupted
         If a signal came.
     """
-    values = (None, *distances.values())
+    scene, values = marching.scene, (None, *distances.values())
     ended = marching.of([variant_of(scene, value) for value in values])
     rows = [_row(*both) for both in zip(values, ended, strict=True)]
     kind = scene.train.pantographs[0].name
