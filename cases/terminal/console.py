@@ -12,9 +12,10 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TextIO, get_type_hints
+from typing import Annotated, Any, TextIO, get_args, get_origin, get_type_hints
 
 import typer
+from typer.models import ArgumentInfo
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.lone_process import alone as alone
@@ -219,6 +220,7 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
     for name, one in signature.parameters.items():
         parameters += groups[name][1].values() if name in groups else [one.replace(kind=_BY_NAME)]
     parameters.append(_parameter("quiet", Quiet, False))
+    parameters.sort(key=_takes_the_rest)
     wrapped.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapped
@@ -241,6 +243,15 @@ def _fields_of(name: str, group: Any) -> dict[str, inspect.Parameter]:
         else:
             found[field] = _parameter(field, hint, default)
     return found
+
+
+def _takes_the_rest(one: inspect.Parameter) -> bool:
+    """Whether a parameter stands for all further arguments, so that it comes behind the others."""
+    marks = getattr(one.annotation, "__metadata__", ())
+    if not any(isinstance(mark, ArgumentInfo) for mark in marks):
+        return False
+    hint = one.annotation.__origin__
+    return list in [get_origin(own) for own in (hint, *get_args(hint))]
 
 
 def serial(command: Callable[..., int | None]) -> Callable[..., int | None]:

@@ -9,13 +9,9 @@ import typer
 
 from catenary.cases.cli import completion
 from catenary.cases.cli.app import (
-    Assignments,
-    Case,
     Force,
-    MoreAssignments,
     Out,
     SceneWords,
-    Shortened,
     folder_option,
     leave,
     serial_verb,
@@ -139,7 +135,7 @@ def sensitivity(
     epilog="Example: catenary identify ac_simple measured.csv task.toml -o results/identified",
 )
 def identify(
-    case: Case,
+    words: SceneWords,
     measured: Annotated[
         Path, typer.Argument(help="CSV file of a passage: places or times, forces, head heights.")
     ],
@@ -151,16 +147,13 @@ def identify(
         ),
     ],
     out: Out,
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
     force: Force = False,
 ) -> int:
     """Serial."""
     from catenary.identifications import identified, identified_files, task_of
 
     wanted = task_of(task)
-    scene = SceneWords(case, extras, assignments, shortened).scene()
+    scene = words.scene()
     from catenary.cases.studies.identification.output import PARAMETERS
 
     refuse_table(out / PARAMETERS, force)
