@@ -163,7 +163,7 @@ def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
             raise InputError(f"{key} in vary is {shown(values)}; it must be a list of values")
         texts = tuple(text_of(plain_value(own, f"{key} in vary")) for own in values)
         if texts:
-            varied.append(varied_key(str(key), texts, "vary"))
+            varied.append(varied_key(str(key), texts))
     if not varied or len(varied) < len(vary or {}):
         raise InputError("there is nothing to vary: give at least one key with a value")
     variants = product(varied, {}, "in vary")

@@ -40,6 +40,10 @@ def test_quiet_says_nothing_but_errors() -> None:
         ("waves results/run --force", "--force replaces results in the folder of -o"),
         ("sweep ac_simple -o x --vary train.speed_km_h=1,2 --part 1/2 --histogram", "a part has"),
         ("sweep ac_simple -o x --vary train.speed_km_h=1,2 --part 1/2 --plot std_N", "a part has"),
+        (
+            "sweep ac_simple -o x --vary train.speed_km_h=1,2 --plot ,",
+            'catenary: "" is no statistic',
+        ),
         ("check en50318_2002 -- -log_view", "-log_view after -- is an option for PETSc; this verb"),
     ],
 )

@@ -238,7 +238,8 @@ def parse_axes(text: str | None) -> list[Axis]:
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in AXES:
-            raise InputError(f"--axes {shown(name)[1:-1]} is unknown; there are {', '.join(AXES)}")
+            told = shown(name)[1:-1] or shown(name)
+            raise InputError(f"--axes {told} is unknown; there are {', '.join(AXES)}")
         if names.count(name) > 1:
             raise InputError(f"--axes names {name} twice")
     return [AXES[name] for name in names]

@@ -16,6 +16,7 @@ from catenary.base.mpi import MPI
 from catenary.cases.process.interrupts import Phase
 from catenary.cases.run.prepared import rest_of
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import end_of, problem_of
@@ -244,7 +245,8 @@ def _named(effects: SwitchableEffects, names: Sequence[str]) -> list[Switch]:
         if name in effects.always:
             raise InputError(f"--only {name}: it is part of every scene and cannot be left out")
         if name not in known:
-            raise InputError(f"--only {name} is no effect; there are {', '.join(known)}")
+            told = shown(name)[1:-1] or shown(name)
+            raise InputError(f"--only {told} is no effect; there are {', '.join(known)}")
     return [known[name] for name in dict.fromkeys(names)]
 
 
