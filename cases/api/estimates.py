@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from catenary.cases.studies.sampling.tables import SamplingTable
     from catenary.cases.studies.uncertainty import evaluation
     from catenary.cases.studies.uncertainty.run_table import RunTable
+    from catenary.postproc.report.study_table import Content
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -152,14 +153,11 @@ def uncertainty(
     )
 
 
-def write_uncertainty(found: Uncertainty, folder: Path) -> list[Path]:
-    """Write estimates and pictures as ``catenary uncertainty`` does; returns the files.
+def estimate_files(found: Uncertainty) -> dict[str, Content]:
+    """Estimates and pictures, as ``catenary uncertainty`` writes them. Not collective."""
+    from catenary.cases.studies.uncertainty.output import files_of
 
-    Not collective.
-    """
-    from catenary.cases.studies.uncertainty.output import write
-
-    return write(folder, found._runs, found._own)
+    return files_of(found._runs, found._own)
 
 
 def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable, str]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from catenary.cases.studies.identification.study import Identification
     from catenary.cases.studies.identification.task import Task
+    from catenary.postproc.report.study_table import Content
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -189,9 +190,8 @@ def task_of(task: str | Path | Mapping[str, Any]) -> Task:
     return read_task(tables_or_file(task, "task"), Task)
 
 
-def write_identified(found: Identified, folder: Path) -> list[Path]:
-    """Write what ``catenary identify -o`` writes; returns the files. Not collective."""
+def identified_files(found: Identified) -> dict[str, Content]:
+    """What ``catenary identify -o`` writes. Not collective."""
     from catenary.cases.studies.identification.output import files_of
-    from catenary.postproc.report.study_table import write_files
 
-    return write_files(folder, files_of(found._own))
+    return files_of(found._own)

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.lone_process import alone
 from catenary.callers import (
@@ -215,18 +215,13 @@ def tolerance(
     return pd.DataFrame(rows)
 
 
-@dataclass(frozen=True)
-class Made:
-    """A study over a set of scenes: plan, what was found, its files. As text what is printed."""
+class Made(NamedTuple):
+    """A study over a set of scenes: plan, what was found, what the program prints, its files."""
 
     plan: Any
     found: Any
+    text: str
     files: list[Path]
-    _output: Any
-
-    def __str__(self) -> str:
-        text: str = self._output.as_text(self.plan, self.found)
-        return text
 
 
 def optima(read: Callable[[], tuple[Draft, Task]], out: str | Path | None, **how: Any) -> Made:
@@ -299,7 +294,7 @@ def _made(
     plan = make_plan(draft, read_task(tables_or_file(task, "task"), model))
     for sentence in plan.warnings:
         warn(sentence)
-    with held_study(folder, alone(), command, force) as (kept, write), workers(n_jobs) as pool:
-        found = find(plan, pool, kept, say)
-        files = write(lambda own: output.write(own, plan, found))
-    return Made(plan, found, files, output)
+    with held_study(folder, alone(), command, force) as held, workers(n_jobs) as pool:
+        found = find(plan, pool, held.kept, say)
+        files = held.write(lambda: output.files_of(plan, found))
+    return Made(plan, found, output.as_text(plan, found), files)

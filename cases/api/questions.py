@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.base.lone_process import alone
 from catenary.base.parallel import on_root
@@ -20,14 +19,12 @@ from catenary.callers import (
     say_on_error_stream,
 )
 from catenary.cases.process.petsc_options import options_of
+from catenary.cases.studies.asked import Distances, Speeds
 from catenary.scenes import SceneLike, checked, draft_of, scene_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from catenary.cases.scene.scene import Scene as Checked
-    from catenary.cases.studies.questions.highest_speed import Speeds
-    from catenary.cases.studies.questions.separation import Distances
     from catenary.cases.studies.sweep.together import Marching
     from catenary.postproc.report.study_table import StudyTable
 
@@ -36,12 +33,12 @@ _PROGRAM = "a study of a Python program"
 
 def highest_speeds(
     scene: SceneLike,
-    slowest: float = 200.0,
-    fastest: float = 360.0,
+    slowest: float = Speeds.slowest,
+    fastest: float = Speeds.fastest,
     out: str | Path | None = None,
     *,
-    step: float = 10.0,
-    within: float = 1.0,
+    step: float = Speeds.step,
+    within: float = Speeds.within,
     criteria: str | Sequence[str] = (),
     direction: str | None = None,
     jobs: int = 1,
@@ -100,7 +97,9 @@ def highest_speeds(
     >>> float(table.highest_km_h[0]), float(table.fails_at_km_h[0])
     (305.0, 310.0)
     """
-    from catenary.cases.studies.questions.highest_speed import TABLE, Speeds
+    import pandas as pd
+
+    from catenary.cases.studies.questions.highest_speed import TABLE
 
     speeds = Speeds(
         number_of(slowest, "slowest"),
@@ -109,17 +108,19 @@ def highest_speeds(
         number_of(within, "within"),
     )
     names = listed(criteria, "criteria")
-    with _marching(scene, out, TABLE, speeds.first, jobs, force, progress) as (marching, own):
-        return find_speeds(marching, own, speeds, names, direction).table()
+    speeds.first()
+    with _marching(scene, out, TABLE, jobs, force, progress) as marching:
+        found = find_speeds(marching, speeds, names, direction)
+    return pd.DataFrame(found.table.records())
 
 
 def separations(
     scene: SceneLike,
-    nearest: float = 31.0,
-    farthest: float = 400.0,
+    nearest: float = Distances.nearest,
+    farthest: float = Distances.farthest,
     out: str | Path | None = None,
     *,
-    step: float = 1.0,
+    step: float = Distances.step,
     jobs: int = 1,
     force: bool = False,
     progress: bool = False,
@@ -161,13 +162,17 @@ def separations(
     >>> table.separation_m.tolist()[1:], bool(table.std_trailing_N[2] > table.std_trailing_N[1])
     ([50.0, 90.0], True)
     """
-    from catenary.cases.studies.questions.separation import TABLE, Distances
+    import pandas as pd
+
+    from catenary.cases.studies.questions.separation import TABLE
 
     distances = Distances(
         number_of(nearest, "nearest"), number_of(farthest, "farthest"), number_of(step, "step")
     )
-    with _marching(scene, out, TABLE, distances.values, jobs, force, progress) as (marching, own):
-        return find_separations(marching, own, distances, explained=out is not None).table()
+    distances.values()
+    with _marching(scene, out, TABLE, jobs, force, progress) as marching:
+        found = find_separations(marching, distances, explained=out is not None)
+    return pd.DataFrame(found.table.records())
 
 
 @contextmanager
@@ -175,18 +180,13 @@ def _marching(
     scene: SceneLike,
     out: str | Path | None,
     table: str,
-    check: Callable[[], object],
     jobs: int,
     force: bool,
     progress: bool,
-) -> Iterator[tuple[Marching, Checked]]:
-    """The march of variants of a scene, and the scene itself.
-
-    ``check`` raises InputError if what is asked for is impossible; ``table`` is left in ``out``.
-    """
+) -> Iterator[Marching]:
+    """The march of variants of a scene by a question that leaves a ``table`` in ``out``."""
     from catenary.cases.result_folder.output_folder import refuse_table
 
-    check()
     n_jobs, folder = n_at_once(jobs), folder_of(out)
     if folder is not None:
         refuse_table(folder / table, force)
@@ -197,12 +197,12 @@ def _marching(
 
     say = say_on_error_stream if progress else say_nothing
     with options_of(own.petsc.given()) as petsc, ending_as_python():
-        yield Marching(draft_of(given), folder, comm, RunOptions(force, petsc, say, n_jobs)), own
+        options = RunOptions(force, petsc, say, n_jobs)
+        yield Marching(draft_of(given), own, folder, comm, options)
 
 
 def find_speeds(
     marching: Marching,
-    scene: Checked,
     speeds: Speeds,
     criteria: Sequence[str],
     direction: str | None,
@@ -210,22 +210,20 @@ def find_speeds(
 ) -> Answer:
     """Find the highest speeds, and write files if the marches have a folder.
 
-    ``marching`` marches the variants of the scene, ``command`` says to others that want the folder
-    what this process does; all else, and errors, are those of
-    ``cases.studies.questions.highest_speed.find_speeds``. Collective.
+    ``command`` says to others that want the folder what this process does; all else, and errors,
+    are those of ``cases.studies.questions.highest_speed.find_speeds``. Collective.
     """
     from catenary.cases.studies.questions import highest_speed as question
     from catenary.cases.studies.records import held_study
 
-    with held_study(marching.out, marching.comm, command) as (_, write):
-        found = question.find_speeds(marching, scene, speeds, list(criteria), direction)
-        files = write(lambda folder: question.write(folder, found))
-    return Answer(question.table_of_criteria(found), question.as_text(found), files)
+    with held_study(marching.out, marching.comm, command) as held:
+        found = question.find_speeds(marching, speeds, list(criteria), direction)
+        files = held.write(lambda: question.files_of(found))
+    return Answer(question.as_text(found), question.table_of_criteria(found), files)
 
 
 def find_separations(
     marching: Marching,
-    scene: Checked,
     distances: Distances,
     command: str = _PROGRAM,
     *,
@@ -240,28 +238,19 @@ def find_separations(
     from catenary.cases.studies.records import held_study
 
     comm = marching.comm
-    with held_study(marching.out, comm, command) as (_, write):
-        found = question.find_separations(marching, scene, distances)
+    with held_study(marching.out, comm, command) as held:
+        found = question.find_separations(marching, distances)
         if not explained:
-            return Answer(found.table(), "", [])
+            return Answer("", found.table(), [])
+        scene = marching.scene
         period = on_root(comm, lambda: question.period_in(found, scene), takes_long=True)
-        files = write(lambda folder: question.write(folder, found, period))
-    return Answer(found.table(), question.as_text(found, period), files)
+        files = held.write(lambda: question.files_of(found, period))
+    return Answer(question.as_text(found, period), found.table(), files)
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Answer to a question, and the files with it. As text what the program prints."""
+class Answer(NamedTuple):
+    """Answer to a question: what the program prints, the table that Python gets, files with it."""
 
-    own: StudyTable
     text: str
+    table: StudyTable
     files: list[Path]
-
-    def table(self) -> pd.DataFrame:
-        """The table that a program gets."""
-        import pandas as pd
-
-        return pd.DataFrame(self.own.records())
-
-    def __str__(self) -> str:
-        return self.text

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.base.lone_process import alone
 from catenary.callers import listed, progress_shown
@@ -105,18 +103,14 @@ def rest_derivatives(
     return Derivatives(rest_text(found), along_span(found), AT_REST, found.left_out)
 
 
-@dataclass(frozen=True)
-class Derivatives:
+class Derivatives(NamedTuple):
     """Derivatives of the statistics of a scene, or of its line at rest.
 
     Attributes
     ----------
-    text : str
-        What the program prints.
-    rows : StudyTable
-        The table, which is written as ``file``.
-    left_out : mapping
-        Why there is no derivative by a usual parameter, by its key.
+    text : what the program prints
+    rows, file : the table, and the file that it is written as
+    left_out : why there is no derivative by a usual parameter, by its key
     """
 
     text: str
@@ -131,9 +125,3 @@ class Derivatives:
         table = pd.DataFrame(self.rows.records())
         table.attrs["left_out"] = [f"{key}: {why}" for key, why in self.left_out.items()]
         return table
-
-    def write(self, folder: Path) -> list[Path]:
-        """Write the table into a folder; returns the files. Not collective."""
-        from catenary.postproc.report.study_table import write_files
-
-        return write_files(folder, {self.file: self.rows})

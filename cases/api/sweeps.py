@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +37,6 @@ if TYPE_CHECKING:
 
     from catenary.cases.scene.load import Draft
     from catenary.cases.studies.sampling.tables import SamplingTable
-    from catenary.cases.studies.sweep.jobs import Ended, Part, RunOptions
-    from catenary.cases.studies.sweep.sweep import Sweep
-    from catenary.cases.studies.uncertainty.evaluation import Uncertainty as Evaluated
 
 
 def sweep(
@@ -104,8 +100,12 @@ def sweep(
     >>> table["train.speed_km_h"].tolist(), bool(table.std_N[1] > table.std_N[0])
     ([200, 250], True)
     """
+    import pandas as pd
+
     n_jobs, given, kept = n_at_once(jobs), folder_of(out), listed(histories, "histories")
+    from catenary.cases.studies.planned_sweep import plan_sweep
     from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
+    from catenary.cases.studies.sweep.output import table_of
 
     if kept and given is None:
         raise InputError("histories are kept in a file: give the folder out, too")
@@ -136,7 +136,8 @@ def sweep(
         found = made.run(comm, plan, "a sweep of a Python program", drawn)
     if interrupted(found.ended):
         raise KeyboardInterrupt
-    return found.table(comm)
+    # Of rank 0: times of a rank are its own.
+    return pd.DataFrame(on_root(comm, lambda: table_of(found.ended).records()))
 
 
 def samples_of(
@@ -152,101 +153,6 @@ def samples_of(
     return samples(sampling, draft.scene(), where), sampling
 
 
-def plan_sweep(
-    draft: Draft,
-    variants: Sequence[Variant],
-    folder: Path,
-    sampling: SamplingTable | None = None,
-    **how: Any,
-) -> PlannedSweep:
-    """A sweep of a case into a folder, all scenes checked. Not collective.
-
-    ``sampling`` is what made the variants, if the table is to be evaluated; all else, and errors,
-    are those of ``cases.studies.sweep.sweep.sweep_of``.
-    """
-    from catenary.cases.studies.sweep.sweep import sweep_of
-
-    return PlannedSweep(sweep_of(draft, variants, folder, **how), folder, sampling)
-
-
-@dataclass(frozen=True)
-class PlannedSweep:
-    """A sweep that can be run, from ``plan_sweep``."""
-
-    own: Sweep
-    folder: Path
-    sampling: SamplingTable | None
-
-    def run(
-        self,
-        comm: Any,
-        options: RunOptions,
-        command: str,
-        plotted: Sequence[str] | None = (),
-        histogram: bool = False,
-    ) -> Swept:
-        """Run what is not done yet, write table and pictures, and evaluate samples. Collective.
-
-        ``comm``, ``options``, ``command``, ``plotted`` and ``histogram`` are as of
-        ``cases.studies.sweep.sweep.run_sweep``. Samples are drawn as points, not as lines.
-        """
-        from catenary.cases.studies.sweep.sweep import run_sweep
-
-        folder, sampling = self.folder, self.sampling
-        lines = plotted if sampling is None else None
-        ended, files = run_sweep(self.own, folder, comm, options, command, lines, histogram)
-        if sampling is None:
-            return Swept(ended, files)
-        from catenary.cases.result_folder.folder_lock import held
-        from catenary.cases.studies.sweep.output import table_of
-        from catenary.cases.studies.uncertainty.output import write_evaluated
-
-        def evaluate() -> tuple[Evaluated, list[Path]]:
-            return write_evaluated(folder, table_of(ended).records(), sampling, plotted or ())
-
-        with held(folder, comm, command):
-            evaluated, more = on_root(comm, evaluate, takes_long=True)
-        return Swept(ended, [*files, *more], evaluated)
-
-    def run_part(self, part: Part, comm: Any, options: RunOptions) -> list[Ended]:
-        """Run a part, as ``cases.studies.sweep.sweep.run_part``, with its sampling. Collective."""
-        from catenary.cases.studies.sweep.sweep import run_part
-
-        ended, sampling = run_part(self.own, part, self.folder, comm, options), self.sampling
-        if sampling is not None:
-            from catenary.cases.studies.uncertainty.run_table import sampling_file
-            from catenary.postproc.report.study_table import write_files
-
-            on_root(comm, lambda: write_files(self.folder / part.folder, sampling_file(sampling)))
-        return ended
-
-
-@dataclass(frozen=True)
-class Swept:
-    """A sweep that ended: its variants, the files, what samples say. As text what is printed."""
-
-    ended: list[Ended]
-    files: list[Path]
-    evaluated: Evaluated | None = None
-
-    def table(self, comm: Any) -> pd.DataFrame:
-        """The table that ``sweep`` returns. Collective: times of a rank are its own."""
-        import pandas as pd
-
-        from catenary.cases.studies.sweep.output import table_of
-
-        return pd.DataFrame(on_root(comm, lambda: table_of(self.ended).records()))
-
-    def __str__(self) -> str:
-        if self.evaluated is None:
-            from catenary.cases.studies.sweep import output
-
-            return output.as_text(self.ended)
-        from catenary.cases.studies.uncertainty.output import as_text
-
-        return as_text(self.evaluated)
-
-
 def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
     """The variants of lists of values."""
     if vary is not None and not isinstance(vary, Mapping):
@@ -257,7 +163,7 @@ def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
             raise InputError(f"{key} in vary is {shown(values)}; it must be a list of values")
         texts = tuple(text_of(plain_value(own, f"{key} in vary")) for own in values)
         if texts:
-            varied.append(varied_key(str(key), texts, "vary"))
+            varied.append(varied_key(str(key), texts))
     if not varied or len(varied) < len(vary or {}):
         raise InputError("there is nothing to vary: give at least one key with a value")
     variants = product(varied, {}, "in vary")

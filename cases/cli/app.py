@@ -22,12 +22,13 @@ from catenary.cases.result_folder.output_folder import run_folder
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.postproc.read.records import Records
+    from catenary.postproc.report.study_table import Content
 
     Command = Callable[..., int | None]
 
@@ -151,7 +152,7 @@ class SceneWords:
         """All assignments of a verb that takes no options for PETSc."""
         changes, options = self.split()
         if options:
-            raise InputError(f"{options[0]} after -- is a PETSc option; only run takes those")
+            raise InputError(f"{options[0]} after -- is an option for PETSc; this verb takes none")
         return changes
 
     def draft(self) -> tuple[Draft, list[str]]:
@@ -380,7 +381,22 @@ def records_of(folder: Path) -> Records | None:
 
 
 def print_findings(text: str, files: Sequence[Path]) -> None:
-    """Print what a study found, and the files that it has written. Not collective."""
+    """Print what a study found, below its progress, and the files that it has written.
+
+    Not collective.
+    """
     console.say("\n" + text)
     if files:
         console.say("\n" + "\n".join(map(str, files)))
+
+
+def leave(out: Path | None, text: str, content: Callable[[], Mapping[str, Content]]) -> None:
+    """Print what a study found that shows no progress, and leave its files in a folder, if any.
+
+    Not collective.
+    """
+    console.say(text)
+    if out is not None:
+        from catenary.postproc.report.study_table import write_files
+
+        console.say("\n" + "\n".join(map(str, write_files(out, content()))))

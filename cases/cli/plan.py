@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -107,13 +108,12 @@ def _within(option: str, value: float, low: float, high: float) -> float:
 
 def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
     """Runs ``--cost``; returns the exit code."""
-    import tempfile
-
     from catenary.base.parallel import launched_by_mpirun
+    from catenary.callers import temporary_folder
     from catenary.cases.process.petsc_options import as_arguments, start_petsc
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
     from catenary.cases.scene.load import load_scene
+    from catenary.cases.studies.records import held_study
 
     if launched_by_mpirun() and console.world().size > 1:
         raise InputError(
@@ -131,15 +131,13 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
         if not as_json:
             console.say(line)
 
-    if out is None:
-        with tempfile.TemporaryDirectory(prefix="catenary_cost_") as folder:
-            found = study.measure(options, Path(folder), say, n_jobs=n_jobs)
-        files: list[Path] = []
-    else:
-        with held(out, comm, f"catenary plan {options.case} --cost"):
+    with ExitStack() as stack:
+        held = stack.enter_context(held_study(out, comm, f"catenary plan {options.case} --cost"))
+        if out is not None:
             refuse_table(out / output.RECORD, force)
-            found = study.measure(options, out / _RUNS, say, force, n_jobs)
-            files = [] if found is None else output.write(found, out)
+        folder = out or stack.enter_context(temporary_folder(comm, "cost"))
+        found = study.measure(options, folder / _RUNS, say, force, n_jobs)
+        files = [] if found is None else held.write(lambda: output.files_of(found))
     if found is None:
         again = "" if out is None else "; the same command continues it"
         console.complain(f"interrupted before all effects were run{again}")

@@ -82,16 +82,13 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
     """
     new_file(path, DRAWN, force)
     from catenary.cases.scene.problem import problem_of
+    from catenary.postproc.files.disk import write_into
+    from catenary.postproc.report.pictures.figures import file_of
     from catenary.solver.statics.form_finding.equilibrium import find_form
 
     problem, mesh = problem_of(scene), mesh_of(scene)
     figure, stretch = line_figure(scene, problem, mesh, find_form(problem, mesh)[1])
-    try:
-        figure.savefig(path, format=path.suffix[1:], metadata={} if path.suffix == ".png" else None)
-    except OSError as error:
-        from catenary.postproc.files.disk import unwritten  # loads HDF5
-
-        raise unwritten(path, error) from error
+    write_into(path.parent, {path.name: file_of(figure, path.name)})
     return stretch
 
 

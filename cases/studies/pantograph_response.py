@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from catenary.base.errors import InputError
 from catenary.cases.run.describe.pantographs import description_of
 from catenary.cases.scene.problem import pantograph_of, static_force
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.asked import Frequencies
 from catenary.mbs.build import PantographData
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
 from catenary.mbs.response.frequency_response import HeadResponse, head_response, peaks
@@ -28,49 +28,12 @@ from catenary.postproc.report.pictures.figures import (
     own_style,
     tidy,
 )
-from catenary.postproc.report.study_table import (
-    Content,
-    StudyTable,
-    file_table,
-    texts_table,
-    write_files,
-)
+from catenary.postproc.report.study_table import Content, StudyTable, file_table, texts_table
 
 # Frequencies for the search of peaks and for the fit.
 N_SEARCHED, N_FITTED = 400, 200
 # A mode that moves the head by less than this part of what moves it most is not driven by it.
 UNMOVED = 1e-6
-
-
-class Range(NamedTuple):
-    """Frequencies of the table: from ``low`` to ``high`` [Hz], ``n_points`` of them, geometric.
-
-    ``fit_low`` [Hz]: a lumped model is fitted from there on.
-    """
-
-    low: float
-    high: float
-    n_points: int
-    fit_low: float
-
-    def frequencies(self) -> np.ndarray:
-        """The frequencies, shape (n_points,) [Hz]."""
-        return np.geomspace(self.low, self.high, self.n_points)
-
-    def checked(self) -> Range:
-        """Itself, unless it is none: then an InputError."""
-        if not 0.0 < self.low < self.high <= 1e5:
-            raise InputError(
-                f"--from {self.low:g} --to {self.high:g}: frequencies must grow from above 0 to "
-                "at most 1e5 Hz"
-            )
-        if not 2 <= self.n_points <= 1_000_000:
-            raise InputError(f"--points {self.n_points} must be between 2 and 1000000")
-        if not 0.0 < self.fit_low < self.high:
-            raise InputError(
-                f"--fit-from {self.fit_low:g} must be above 0 Hz and below --to {self.high:g}"
-            )
-        return self
 
 
 class PantographStudy(NamedTuple):
@@ -87,12 +50,14 @@ class PantographStudy(NamedTuple):
     nominal_height: float | None
     data: PantographData
     response: HeadResponse
-    range: Range
+    range: Frequencies
     receptance: np.ndarray
     fit: ChainFit
 
 
-def study(scene: Scene, kind: str | None, n_masses: int | None, over: Range) -> PantographStudy:
+def study(
+    scene: Scene, kind: str | None, n_masses: int | None, over: Frequencies
+) -> PantographStudy:
     """The response of a kind of pantograph of a scene, the leading one's if none is named.
 
     ``n_masses`` of the lumped model: as many as a lumped pantograph has, or two, and one more for
@@ -207,16 +172,14 @@ def fit_error(fit: ChainFit) -> str:
 FILES = ("receptance.csv", "receptance.png", "lumped.toml")
 
 
-def write_study(found: PantographStudy, folder: Path) -> list[Path]:
-    """Write all files and return their paths. Raises ``RunBroken`` if the disk refuses."""
+def files_of(found: PantographStudy) -> dict[str, Content]:
+    """The receptance as table and picture, and the fitted model. Not collective."""
     table, drawn, lumped = FILES
     heads = ("frequency_hz", "receptance_real_m_per_N", "receptance_imag_m_per_N")
     columns = found.range.frequencies(), found.receptance.real, found.receptance.imag
     # The receptance at the head, upward per upward force.
     rows = file_table(heads, np.column_stack(columns).tolist())
-    content: dict[str, Content] = {table: rows, lumped: lumped_toml(found)}
-    content[drawn] = lambda: picture(found)
-    return write_files(folder, content)
+    return {table: rows, lumped: lumped_toml(found), drawn: lambda: picture(found)}
 
 
 @own_style()

@@ -14,6 +14,7 @@ import shutil
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.workers import Outcome, each, in_order
 from catenary.cases.scene.input.plain_text import read_text
 from catenary.postproc.files.disk import plain, write_all
+from catenary.postproc.report.study_table import Content, write_files
 
 logger = logging.getLogger("catenary.sweep")
 
@@ -193,13 +195,44 @@ def _kept_work(
     return rows
 
 
+@dataclass(frozen=True)
+class HeldStudy:
+    """A study whose folder this process holds, from ``held_study``.
+
+    Attributes
+    ----------
+    out : the folder, None to write nothing
+    comm : mpi4py communicator
+    kept : rows that are there from an earlier call
+    """
+
+    out: Path | None
+    comm: Any
+    kept: KeptRows
+
+    def write(self, content: Callable[[], Mapping[str, Content]]) -> list[Path]:
+        """Write all files of the study, then delete its kept rows; returns the files. Collective.
+
+        ``content`` is called on rank 0, and only if there is a folder.
+        """
+        out = self.out
+        if out is None:
+            return []
+
+        def work() -> list[Path]:
+            files = write_files(out, content())
+            self.kept.forget()
+            return files
+
+        files: list[Path] = on_root(self.comm, work, takes_long=True)
+        return files
+
+
 @contextmanager
 def held_study(
     out: Path | None, comm: Any, command: str, force: bool = False
-) -> Iterator[tuple[KeptRows, Callable[[Callable[[Path], list[Path]]], list[Path]]]]:
-    """Lock the folder of a study. Yields its kept rows, and a function that writes its files.
-
-    The kept rows are deleted once the files are written. Collective.
+) -> Iterator[HeldStudy]:
+    """Lock the folder of a study. Collective.
 
     Parameters
     ----------
@@ -211,18 +244,7 @@ def held_study(
     from catenary.cases.result_folder.folder_lock import held
 
     if out is None:
-        yield NOTHING_KEPT, lambda write: []
+        yield HeldStudy(None, comm, NOTHING_KEPT)
         return
-
-    def written(write: Callable[[Path], list[Path]]) -> list[Path]:
-        def work() -> list[Path]:
-            files = write(out)
-            kept.forget()
-            return files
-
-        files: list[Path] = on_root(comm, work, takes_long=True)
-        return files
-
     with held(out, comm, command):
-        kept = KeptRows(out, force and comm.rank == 0)
-        yield kept, written
+        yield HeldStudy(out, comm, KeptRows(out, force and comm.rank == 0))

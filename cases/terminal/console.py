@@ -12,14 +12,15 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TextIO, get_type_hints
+from typing import Annotated, Any, TextIO, get_args, get_origin, get_type_hints
 
 import typer
+from typer.models import ArgumentInfo
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.lone_process import alone as alone
 from catenary.base.lone_process import world as world
-from catenary.base.options import command_line
+from catenary.base.options import Flag, command_line
 from catenary.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 from catenary.cases.scene.input.plain_text import plain, shown
 from catenary.postproc.files.disk_errors import reason
@@ -175,8 +176,8 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
     command is.
     """
     signature = inspect.signature(command, eval_str=True)
-    groups: dict[str, Any] = {
-        name: one.annotation
+    groups: dict[str, tuple[Any, dict[str, inspect.Parameter]]] = {
+        name: (one.annotation, _fields_of(name, one.annotation))
         for name, one in signature.parameters.items()
         if dataclasses.is_dataclass(one.annotation)
     }
@@ -188,9 +189,10 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         try:
             if quiet and kwargs.get("verbose"):
                 raise InputError("--quiet and --verbose exclude each other; give one of them")
-            for name, group in groups.items():
-                own = [field.name for field in dataclasses.fields(group)]
-                kwargs[name] = group(**{field: kwargs.pop(field) for field in own})
+            if kwargs.get("force") and kwargs.get("out", True) is None:
+                raise InputError("--force replaces results in the folder of -o; give both, or none")
+            for name, (group, own) in groups.items():
+                kwargs[name] = group(**{field: kwargs.pop(one.name) for field, one in own.items()})
             with command_line():
                 code = command(*args, **kwargs)
                 for print_last in _last_words:
@@ -216,9 +218,9 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
     # The command line is made from signature and annotations.
     parameters: list[inspect.Parameter] = []
     for name, one in signature.parameters.items():
-        own = _fields_of(groups[name]) if name in groups else [one.replace(kind=_BY_NAME)]
-        parameters += own
+        parameters += groups[name][1].values() if name in groups else [one.replace(kind=_BY_NAME)]
     parameters.append(_parameter("quiet", Quiet, False))
+    parameters.sort(key=_takes_the_rest)
     wrapped.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapped
@@ -228,17 +230,28 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
     return inspect.Parameter(name, _BY_NAME, default=default, annotation=annotation)
 
 
-def _fields_of(group: Any) -> list[inspect.Parameter]:
-    """The fields of a dataclass as parameters."""
-    hints = get_type_hints(group, include_extras=True)
-    return [
-        _parameter(
-            one.name,
-            hints[one.name],
-            inspect.Parameter.empty if one.default is dataclasses.MISSING else one.default,
-        )
-        for one in dataclasses.fields(group)
-    ]
+def _fields_of(name: str, group: Any) -> dict[str, inspect.Parameter]:
+    """The fields of a dataclass as parameters; a ``Flag`` is an option of the group's own."""
+    found = {}
+    for field, hint in get_type_hints(group, include_extras=True).items():
+        default = getattr(group, field, inspect.Parameter.empty)
+        flag = next(iter(getattr(hint, "__metadata__", ())), None)
+        if isinstance(flag, Flag):
+            option = typer.Option(flag.name, help=flag.help, metavar=flag.metavar)
+            own = Annotated[hint.__origin__, option]  # type: ignore[name-defined]
+            found[field] = _parameter(f"{name}_{field}", own, default)
+        else:
+            found[field] = _parameter(field, hint, default)
+    return found
+
+
+def _takes_the_rest(one: inspect.Parameter) -> bool:
+    """Whether a parameter stands for all further arguments, so that it comes behind the others."""
+    marks = getattr(one.annotation, "__metadata__", ())
+    if not any(isinstance(mark, ArgumentInfo) for mark in marks):
+        return False
+    hint = one.annotation.__origin__
+    return list in [get_origin(own) for own in (hint, *get_args(hint))]
 
 
 def serial(command: Callable[..., int | None]) -> Callable[..., int | None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, NamedTuple, get_type_hints
 
 _on_command_line = False
 
@@ -19,6 +20,33 @@ def option(flag: str, argument: str) -> str:
         The argument of the function of ``catenary`` that does the same, such as ``force=True``.
     """
     return flag if _on_command_line else argument
+
+
+class Flag(NamedTuple):
+    """An option of the command line, as the annotation of a field that is also one of Python.
+
+    Attributes
+    ----------
+    name : with its dashes
+    help : its line
+    metavar : what stands there for a value, None for its type
+    """
+
+    name: str
+    help: str
+    metavar: str | None = None
+
+
+def flag_of(group: type, field: str) -> str:
+    """The option of the command line that a field of a dataclass is. Not collective."""
+    (flag,) = get_type_hints(group, include_extras=True)[field].__metadata__
+    name: str = flag.name
+    return name
+
+
+def named(asked: Any, field: str) -> str:
+    """Name of a field of a dataclass as the user of this process writes it. Not collective."""
+    return option(flag_of(type(asked), field), field)
 
 
 def is_command_line() -> bool:

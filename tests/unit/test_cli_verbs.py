@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import os
 import subprocess
 import sys
 import types
@@ -371,11 +373,19 @@ def test_a_stability_map_is_refused_where_it_cannot_be_made(tmp_path: Path) -> N
 def test_a_full_disk_is_told(
     words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """And leaves what was there, of which --force left nothing."""
+
+    def full(self: Path, data: bytes) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
     monkeypatch.chdir(tmp_path)
-    Path(words[-1]).symlink_to("/dev/full")
+    there = Path(words[-1])
+    there.write_text("mine")
+    monkeypatch.setattr(Path, "write_bytes", full)
     done = invoke(*words, "--force")
     assert done.exit_code == 1, done.output
-    assert f"writing {words[-1]} failed (No space left on device): free some" in done.output
+    assert f"writing {there} failed (No space left on device): free some" in done.output
+    assert there.read_text() == "mine" and list(Path.cwd().iterdir()) == [Path.cwd() / there]
 
 
 def test_a_device_takes_no_uncertainty(tmp_path: Path) -> None:

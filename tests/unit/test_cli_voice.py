@@ -32,6 +32,27 @@ def test_quiet_says_nothing_but_errors() -> None:
     assert invoke("list").stdout  # the next one speaks again
 
 
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ("sensitivity en50318_2002 --force", "--force replaces results in the folder of -o"),
+        ("speed en50318_2002 --force", "--force replaces results in the folder of -o"),
+        ("waves results/run --force", "--force replaces results in the folder of -o"),
+        ("sweep ac_simple -o x --vary train.speed_km_h=1,2 --part 1/2 --histogram", "a part has"),
+        ("sweep ac_simple -o x --vary train.speed_km_h=1,2 --part 1/2 --plot std_N", "a part has"),
+        (
+            "sweep ac_simple -o x --vary train.speed_km_h=1,2 --plot ,",
+            'catenary: "" is no statistic',
+        ),
+        ("check en50318_2002 -- -log_view", "-log_view after -- is an option for PETSc; this verb"),
+    ],
+)
+def test_options_that_nothing_would_come_of_are_refused(words: str, sentence: str) -> None:
+    """They were read and ignored; of those for PETSc only run was said to take them."""
+    done = invoke(*words.split())
+    assert done.exit_code == 2 and sentence in done.stderr
+
+
 def test_quiet_and_verbose_exclude_each_other() -> None:
     done = invoke("run", "ac_simple", "-o", "nowhere", "-q", "-v")
     assert done.exit_code == 2

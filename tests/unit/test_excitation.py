@@ -7,7 +7,8 @@ import pytest
 from small_lines import BARE, bare_wires, mesh_of, problem_of, train
 
 from catenary import InputError
-from catenary.cases.studies.waves.excited import Settings, excitation_of, without_train
+from catenary.cases.studies.asked import Excited
+from catenary.cases.studies.waves.excited import excitation_of, without_train
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.loads import FieldLoad, ShapeLoad
 from catenary.solver.problem.problem import Problem
@@ -68,11 +69,11 @@ def test_a_hammer_has_its_impulse_and_a_pulse_its_force() -> None:
 
 
 def test_a_scene_gives_what_is_not_asked_for() -> None:
-    found = excitation_of("force", Settings(), problem(), 1e-3)
+    found = excitation_of("force", Excited(), problem(), 1e-3)
     assert found == MovingForce(120.0, 0.0, 10.0, 50.0, 0.5)
-    found = excitation_of("pulse", Settings(at=20.0), problem(), 1e-3)
+    found = excitation_of("pulse", Excited(at=20.0), problem(), 1e-3)
     assert found == Blow(20.0, 0.1, 120.0, False)
-    found = excitation_of("hammer", Settings(impulse=5.0, duration=0.05), problem(), 1e-3)
+    found = excitation_of("hammer", Excited(impulse=5.0, duration=0.05), problem(), 1e-3)
     assert found == hammer(30.0, 5.0, 0.05)
 
 
@@ -89,40 +90,40 @@ def test_a_blow_is_marched_until_its_waves_have_come_to_the_far_end() -> None:
 @pytest.mark.parametrize(
     ("kind", "settings", "sentence"),
     [
-        ("force", Settings(at=20.0), "--at-m belongs to --excite pulse or hammer, not to force"),
-        ("hammer", Settings(force=20.0), "--force-N belongs to --excite force or pulse, not to"),
+        ("force", Excited(at=20.0), "--at-m belongs to --excite pulse or hammer, not to force"),
+        ("hammer", Excited(force=20.0), "--force-N belongs to --excite force or pulse, not to"),
         (
             "pulse",
-            Settings(frequency=2.0),
+            Excited(frequency=2.0),
             "--frequency-Hz belongs to --excite force, not to pulse",
         ),
-        ("pulse", Settings(at=60.0), "--at-m is 60, but must lie on the line, from 0 to 60 m"),
-        ("pulse", Settings(at=np.nan), "--at-m is nan, but must be finite"),
-        ("hammer", Settings(impulse=0.0), "--impulse-Ns is 0, which excites nothing"),
-        ("force", Settings(force=0.0), "--force-N is 0, which excites nothing"),
-        ("force", Settings(frequency=101.0), "--frequency-Hz is 101, but must be from 0 to 100"),
-        ("force", Settings(frequency=-1.0), "--frequency-Hz is -1, but must be from 0 to 100"),
-        ("hammer", Settings(duration=0.005), "--duration-s is 0.005, but must be from 0.01"),
+        ("pulse", Excited(at=60.0), "--at-m is 60, but must lie on the line, from 0 to 60 m"),
+        ("pulse", Excited(at=np.nan), "--at-m is nan, but must be finite"),
+        ("hammer", Excited(impulse=0.0), "--impulse-Ns is 0, which excites nothing"),
+        ("force", Excited(force=0.0), "--force-N is 0, which excites nothing"),
+        ("force", Excited(frequency=101.0), "--frequency-Hz is 101, but must be from 0 to 100"),
+        ("force", Excited(frequency=-1.0), "--frequency-Hz is -1, but must be from 0 to 100"),
+        ("hammer", Excited(duration=0.005), "--duration-s is 0.005, but must be from 0.01"),
         (
             "hammer",
-            Settings(impulse=1e300),
+            Excited(impulse=1e300),
             "--impulse-Ns is 1e+300, a force of up to 7.85398e+301 N",
         ),
         (
             "hammer",
-            Settings(impulse=-1e308),
+            Excited(impulse=-1e308),
             "--impulse-Ns is -1e+308, a force of up to inf N, but",
         ),
-        ("pulse", Settings(force=1e20), "a force of up to 1e+20 N, but forces up to 1e+09 N are"),
+        ("pulse", Excited(force=1e20), "a force of up to 1e+20 N, but forces up to 1e+09 N are"),
         (
             "force",
-            Settings(force=-2e9),
+            Excited(force=-2e9),
             "--force-N is -2e+09, a force of up to 2e+09 N, but forces",
         ),
     ],
 )
 def test_what_is_impossible_is_refused_in_a_sentence(
-    kind: str, settings: Settings, sentence: str
+    kind: str, settings: Excited, sentence: str
 ) -> None:
     with pytest.raises(InputError) as error:
         excitation_of(kind, settings, problem(), 1e-3)

@@ -18,7 +18,8 @@ from catenary import InputError
 from catenary.cases.run.continuing import state_to_continue
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
-from catenary.cases.studies.waves.excited import Settings, Watch, excitation_of, without_train
+from catenary.cases.studies.asked import Excited
+from catenary.cases.studies.waves.excited import Watch, excitation_of, without_train
 from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, waves_seen
 from catenary.cases.studies.waves.study import study_waves
 from catenary.postproc.evaluate.statistics import evaluate
@@ -45,7 +46,7 @@ SHORT = ("line.n_spans=6", "train.start_m=130", "train.end_m=170", "train.raise_
          "train.pantographs=[{name='three_masses'}]")  # fmt: skip
 
 
-def excited(folder: Path, kind: str, settings: Settings, *words: str) -> WavesSeen:
+def excited(folder: Path, kind: str, settings: Excited, *words: str) -> WavesSeen:
     """Run a case under an excitation; what was seen in memory meanwhile."""
     scene = load_scene("ac_simple", (*SHORT, *words))
     problem = problem_of(scene)
@@ -65,7 +66,7 @@ def excited(folder: Path, kind: str, settings: Settings, *words: str) -> WavesSe
 @pytest.fixture(scope="module")
 def struck(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, WavesSeen]:
     folder = tmp_path_factory.mktemp("struck")
-    return folder, excited(folder, "hammer", Settings(at=AT, impulse=5.0, duration=0.05))
+    return folder, excited(folder, "hammer", Excited(at=AT, impulse=5.0, duration=0.05))
 
 
 def test_a_blow_leaves_the_files_of_a_run(struck: tuple[Path, WavesSeen]) -> None:
@@ -153,7 +154,7 @@ def test_report_and_film_of_a_blow_have_no_train(struck: tuple[Path, WavesSeen])
 
 def test_a_force_that_moves_is_seen_on_its_course(tmp_path: Path) -> None:
     seen = excited(
-        tmp_path, "force", Settings(force=FORCE, frequency=2.0), "output.field_every_s=0.1"
+        tmp_path, "force", Excited(force=FORCE, frequency=2.0), "output.field_every_s=0.1"
     )
     with Results(tmp_path) as results:
         data = film_data(results)
@@ -190,7 +191,7 @@ def test_a_window_of_spans_around_a_train_is_refused_for_a_blow() -> None:
     scene = load_scene("ac_simple", (*SHORT, "window.mode=bounded"))
     problem = problem_of(scene)
     with pytest.raises(InputError, match="window.mode is bounded.*a pulse has none"):
-        excitation_of("pulse", Settings(), problem, problem.numerics.dt)
+        excitation_of("pulse", Excited(), problem, problem.numerics.dt)
 
 
 @pytest.mark.study

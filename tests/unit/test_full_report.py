@@ -24,7 +24,7 @@ from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.axes import AXES
 from catenary.cases.studies.accuracy.output import table_of
 from catenary.cases.studies.accuracy.runs import make_plan
-from catenary.cases.studies.effect_cost.output import write
+from catenary.cases.studies.effect_cost.output import files_of
 from catenary.cases.studies.effect_cost.study import (
     UNSWITCHED,
     CostOptions,
@@ -41,11 +41,12 @@ from catenary.cases.studies.full_report.scene_of_run import (
     measured_errors,
 )
 from catenary.cases.studies.reference.judgement import FAILED, PASSED
-from catenary.cases.studies.reference.pages import write_validation
+from catenary.cases.studies.reference.pages import validation_files
 from catenary.cases.studies.reference.validation import Step, Validation
 from catenary.postproc.files.own_files import OWN_FILES
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import interactive
+from catenary.postproc.report.study_table import write_files
 
 CHANGES = ("train.speed_km_h=280", "line.contact_wire.tension_N=21e3")
 
@@ -268,7 +269,7 @@ def test_the_validation_of_the_installation(folder: Path, tmp_path: Path) -> Non
         Step("Test", [], "no"),
     ]
     installation = {"program": "catenary 0.0.1", "machine": "Linux"}
-    write_validation(tmp_path, Validation(steps, installation))
+    write_files(tmp_path, validation_files(Validation(steps, installation)))
     invoke("report", str(tmp_path), "--validation", str(tmp_path))
     said = words_of((tmp_path / "report.html").read_text())
     assert "Statement of catenary 0.0.1 on Linux. It is not one of the program of this run" in said
@@ -357,7 +358,7 @@ def cost_study(folder: Path, case: str, on: bool) -> Path:
     choice = SwitchableEffects([switch], [], {})
     own = Measured(UNSWITCHED, "done", size, 1.0, [figures])
     found = Costs(case, CostOptions(case), choice, (0.0, 50.0), 10, 5.0, ["p"], own, changed)
-    write(found, folder)
+    write_files(folder, files_of(found))
     return folder
 
 

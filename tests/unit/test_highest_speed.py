@@ -18,10 +18,10 @@ from verb_runner import invoke
 import catenary
 from catenary import InputError
 from catenary.cases.scene.turned import BACKWARD, FORWARD, turned
+from catenary.cases.studies.asked import Speeds
 from catenary.cases.studies.questions.highest_speed import (
     ALL,
     KEY,
-    Speeds,
     SpeedStudy,
     as_text,
     find_speeds,
@@ -83,8 +83,8 @@ def searched(
 
     monkeypatch.setattr(Marching, "of", of)
     draft = read_draft(CASE, () if backward is None else (ONE_SIDED,))
-    marching = Marching(draft, None, MPI.COMM_SELF, AS_USUAL)
-    found = find_speeds(marching, draft.scene(), speeds, wanted)
+    marching = Marching(draft, draft.scene(), None, MPI.COMM_SELF, AS_USUAL)
+    found = find_speeds(marching, speeds, wanted)
     return found, marched
 
 
@@ -178,16 +178,16 @@ def test_a_line_without_mirror_image_is_judged_one_way(monkeypatch: pytest.Monke
     monkeypatch.setattr(Marching, "of", lambda self, variants: [Ended(v, "done") for v in variants])
     key = "irregularities.contact_wire_height.standard_deviation_mm"
     draft = read_draft(CASE, [f"{key}=5"])
-    marching = Marching(draft, None, MPI.COMM_SELF, AS_USUAL)
-    found = find_speeds(marching, draft.scene(), Speeds(), ())
+    marching = Marching(draft, draft.scene(), None, MPI.COMM_SELF, AS_USUAL)
+    found = find_speeds(marching, Speeds(), ())
     assert found.directions == (FORWARD,)
     assert f"Trains run forward alone: {key} " in as_text(found)
     with pytest.raises(InputError, match=f"{key}.* has no mirror image"):
-        find_speeds(marching, draft.scene(), Speeds(), (), BACKWARD)
-    chosen = find_speeds(marching, draft.scene(), Speeds(), (), FORWARD)
+        find_speeds(marching, Speeds(), (), BACKWARD)
+    chosen = find_speeds(marching, Speeds(), (), FORWARD)
     assert chosen.one_way == "Trains run forward alone, as chosen."
     with pytest.raises(InputError, match='direction "up" is none of forward, backward'):
-        find_speeds(marching, draft.scene(), Speeds(), (), "up")
+        find_speeds(marching, Speeds(), (), "up")
 
 
 @pytest.mark.parametrize(

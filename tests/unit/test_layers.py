@@ -185,13 +185,14 @@ NAMED_OTHERWISE = {"list": "shipped_cases", "speed": "highest_speeds", "separati
 # What both the face and the command line take from runs and studies: wishes as data, and what verbs
 # without a counterpart in the face need. All other work of these verbs is that of the face.
 TAKEN_BY_BOTH = {
-    "catenary.cases.studies.questions.highest_speed.Speeds",
-    "catenary.cases.studies.questions.separation.Distances",
+    "catenary.cases.studies.asked.Speeds",
+    "catenary.cases.studies.asked.Distances",
     "catenary.cases.studies.sweep.jobs.RunOptions",
     "catenary.cases.studies.sweep.together.Marching",
     "catenary.cases.studies.sweep.variants.check_keys",
     "catenary.cases.studies.sweep.variants.product",
     "catenary.cases.run.planning.plan.make_plan",  # submit: two figures, no table
+    "catenary.cases.studies.planned_sweep.plan_sweep",  # checked scenes, of which none is run
     "catenary.cases.studies.records.held_study",  # numerics: studies that the face has not
 }
 

@@ -25,8 +25,7 @@ from catenary.cases.run.scene_mesh import draw_scene
 def test_a_drawing_shows_the_three_views(case: str, drawn: list[str], tmp_path: Path) -> None:
     out = tmp_path / "line.svg"
     draw_scene(load_scene(case, shortened=True), out, force=False)
-    # Matplotlib draws letters as paths and names them in comments.
-    said = " ".join(re.findall(r"<!-- (.*?) -->", out.read_text(encoding="utf-8")))
+    said = " ".join(re.findall(r"([^<>]+)</text>", out.read_text(encoding="utf-8")))
     for words in drawn:
         assert words in said, said
 

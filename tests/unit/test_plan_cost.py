@@ -28,9 +28,9 @@ from catenary.cases.studies.effect_cost.study import (
     SwitchableEffects,
     jobs_of,
     measure,
-    size_of,
     switchable_effects,
 )
+from catenary.postproc.report.study_table import write_files
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Effect
@@ -121,7 +121,7 @@ def test_counts_are_those_of_the_model() -> None:
         for one, planes in ((problem, (4,)), (wide, (4, 2, 2))):
             model = build(one, mesh, np.ones(mesh.droppers.shape[0]))
             with RepeatedMarch(MPI.COMM_SELF, line_at_rest(one, mesh), 10, 5) as march:
-                size = size_of(march)
+                size = march.size
                 assert march.step_cost() > 0.0
             assert size.n_unknowns == model.numbering.n_unknowns == sum(planes) // 2 * mesh.n_nodes
             assert size.planes == planes
@@ -189,7 +189,7 @@ def test_advice_weighs_cost_against_change() -> None:
 
 
 def test_table_csv_and_json_hold_the_same(found: Costs, tmp_path: Path) -> None:
-    files = output.write(found, tmp_path)
+    files = write_files(tmp_path, output.files_of(found))
     assert [path.name for path in files] == ["cost.csv", "cost.json", "cost.txt"]
     text, record = files[2].read_text(), json.loads(files[1].read_text())
     rows = list(csv.DictReader(files[0].read_text().splitlines()))

@@ -280,6 +280,14 @@ def test_what_cannot_be_judged_is_one_sentence(
         read_results([path], of, is_filtered=True)
 
 
+def test_statistics_have_no_filter(tmp_path: Path) -> None:
+    """--unfiltered was ignored."""
+    path = tmp_path / "given.csv"
+    path.write_text("of,quantity,value\nline,max_uplift_mm,70\n")
+    done = invoke("judge", str(path), "--of", ONE, "--unfiltered")
+    assert done.exit_code == 2 and "these files hold statistics" in done.stderr
+
+
 def test_forces_that_are_given_twice_are_refused() -> None:
     """The second file took the place of the first, and nothing said so."""
     with pytest.raises(InputError, match="gives mean_N of pantograph for .*, which was given befo"):

@@ -12,8 +12,9 @@ from catenary.cases.scene.checks.effects import needs_relative_motion
 from catenary.cases.scene.checks.mesh_size import size_of
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.studies.accuracy.axes import planes
+from catenary.cases.studies.asked import Excited
 from catenary.cases.studies.effect_cost.study import switchable_effects
-from catenary.cases.studies.waves.excited import Settings, excitation_of
+from catenary.cases.studies.waves.excited import excitation_of
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 
@@ -109,8 +110,8 @@ def test_a_force_on_one_of_two_wires_is_refused() -> None:
             problem_of(load_scene(TWIN, words)) for words in ([], ["effects.relative_motion=true"])
         )
         with pytest.raises(InputError, match=f"--excite {kind} acts on one of two contact wires"):
-            excitation_of(kind, Settings(), one, 1e-3)
-        excitation_of(kind, Settings(), apart, 1e-3)
+            excitation_of(kind, Excited(), one, 1e-3)
+        excitation_of(kind, Excited(), apart, 1e-3)
 
 
 def test_it_is_refused_where_there_are_no_twin_wires() -> None:

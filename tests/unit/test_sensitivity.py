@@ -304,6 +304,7 @@ def test_a_step_follows_from_the_size_of_a_value() -> None:
         ("line.topology", "line.topology has no number in this scene"),
         ("pantographs.reference.masses_kg.7", "the list there has entries from 0 to 1"),
         ("pantographs.refernce.masses_kg.0", "; its pantographs are reference"),
+        ("pantographs", "; its pantographs are reference"),
         ("evaluation.to_m", "evaluation.to_m does not act on the march, but on its evaluation"),
         ("line.curve.radius_m", "has no number in this scene"),
         ("line.n_spans", "is a whole number, by which a march has no derivative"),

@@ -12,8 +12,8 @@ from scenes import load_scene
 from verb_runner import invoke
 
 import catenary
+from catenary.cases.studies.asked import Distances
 from catenary.cases.studies.questions.separation import (
-    Distances,
     Period,
     SeparationStudy,
     as_text,

@@ -24,11 +24,12 @@ from catenary.cases.run.runner import run_case
 from catenary.cases.studies.merged_sweeps import merge
 from catenary.cases.studies.records import read_record
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, RunOptions, make_jobs
-from catenary.cases.studies.sweep.output import as_text, draw, key_in_words, table_of, write
+from catenary.cases.studies.sweep.output import as_text, draw, files_of, key_in_words, table_of
 from catenary.cases.studies.sweep.run_jobs import read_summary, run_jobs
 from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 from catenary.postproc.read.results import Results
+from catenary.postproc.report.study_table import write_files
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
@@ -306,7 +307,7 @@ def test_each_row_names_its_variant_where_keys_are_varied_beside_named_ones(
     ]  # fmt: skip
     # The parts of a job array, which share names in the file.
     for name, part in (("a", ended[::2]), ("b", ended[1::2])):
-        write(tmp_path / name, CASE, part, None)
+        write_files(tmp_path / name, files_of(CASE, part, None))
     merged = merge([tmp_path / "a", tmp_path / "b"]).record
     by_name = {row["variant"]: row["std_N"] for row in merged["rows"]}
     assert by_name == {one.variant.name: float(n) for n, one in enumerate(ended, 1)}
@@ -352,7 +353,10 @@ def test_varied_values_keep_their_types(tmp_path: Path) -> None:
         "contact.law": "hertz", "line.span_m": "[50, 60]",
     }  # fmt: skip
     one = fake("a", varied, 3.0)
-    write(tmp_path, CASE, [replace(one, variant=replace(one.variant, named="007"))], ["std_N"])
+    write_files(
+        tmp_path,
+        files_of(CASE, [replace(one, variant=replace(one.variant, named="007"))], ["std_N"]),
+    )
     (row,) = json.loads((tmp_path / "sweep.json").read_text())["rows"]
     assert [row[key] for key in varied] == [250, 5e-4, True, "hertz", [50, 60]]
     assert row["named"] == "007"
@@ -369,7 +373,7 @@ def test_what_failed_is_told_by_name(tmp_path: Path) -> None:
     assert passed["failed"] == [] and passed["passed"]
     said = as_text(ended).splitlines()
     assert said[1].endswith("FAILED maximum contact force") and said[2].endswith("passed")
-    write(tmp_path, CASE, ended, ["std_N"])
+    write_files(tmp_path, files_of(CASE, ended, ["std_N"]))
     first, second = csv.DictReader((tmp_path / "sweep.csv").read_text().splitlines())
     assert (first["failed"], second["failed"]) == ("maximum contact force", "")
 

@@ -19,11 +19,11 @@ import catenary
 from catenary import InputError
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies import merged_sweeps
+from catenary.cases.studies.planned_sweep import plan_sweep
 from catenary.cases.studies.records import FOLDER
 from catenary.cases.studies.sweep.force_histograms import force_histograms
 from catenary.cases.studies.sweep.histories import KeptHistories
 from catenary.cases.studies.sweep.jobs import AS_USUAL, HISTORIES, Ended, Part
-from catenary.cases.studies.sweep.sweep import run_part, run_sweep, sweep_of
 from catenary.cases.studies.sweep.together import pieces_of_work
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 
@@ -262,12 +262,12 @@ def _tables_of(
     kept: tuple[str, ...],
 ) -> dict[str, np.ndarray]:
     """Histories of a sweep, or of a part of it."""
-    sweep = sweep_of(draft, variants, out, only_statistics=True, histories=kept)
+    sweep = plan_sweep(draft, variants, out, only_statistics=True, histories=kept)
     if part is None:
-        run_sweep(sweep, out, MPI.COMM_SELF, AS_USUAL, "a test", None)
+        sweep.run(MPI.COMM_SELF, AS_USUAL, "a test", None)
         folder = out
     else:
-        run_part(sweep, part, out, MPI.COMM_SELF, AS_USUAL)
+        sweep.run_part(part, MPI.COMM_SELF, AS_USUAL)
         folder = out / part.folder
     with h5py.File(folder / "histories.h5") as file:
         return {name: table[...] for name, table in file.items()}

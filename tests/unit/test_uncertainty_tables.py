@@ -14,7 +14,7 @@ from catenary import InputError
 from catenary.cases.studies import merged_sweeps
 from catenary.cases.studies.sampling.tables import sampling_of
 from catenary.cases.studies.sweep.jobs import Ended
-from catenary.cases.studies.sweep.output import table_of, write
+from catenary.cases.studies.sweep.output import files_of, table_of
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import evaluate, failing
@@ -23,6 +23,7 @@ from catenary.cases.studies.uncertainty.run_table import (
     read_run_table,
     run_table,
 )
+from catenary.postproc.report.study_table import write_files
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
@@ -59,7 +60,7 @@ def some(numbers: range) -> list[Ended]:
 
 
 def folder(path: Path, runs: list[Ended], sample: dict[str, Any] | None = None) -> Path:
-    write(path, "a_case", runs, None)
+    write_files(path, files_of("a_case", runs, None))
     if sample is not None:
         (path / SAMPLING).write_text(
             json.dumps(sampling_of(sample, "s.toml").model_dump(exclude_none=True))
@@ -337,7 +338,7 @@ def test_sweeps_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
         "case": {"title": "A"},
         "train": {"speed_km_h": 250.0, "start_m": 1},
     }
-    write(tmp_path / "base", "", runs[:2], None, scene=tables)
+    write_files(tmp_path / "base", files_of("", runs[:2], None, scene=tables))
     # A varied key, a title and the folder of a file may differ, where the train starts may not.
     for number, (start, speed) in enumerate(((1, 250.0), (1, 300.0), (2, 250.0))):
         other = {
@@ -345,7 +346,7 @@ def test_sweeps_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
             "case": {"title": "B"},
             "train": {"speed_km_h": speed, "start_m": start},
         }
-        write(tmp_path / f"other{number}", "", runs[2:], None, scene=other)
+        write_files(tmp_path / f"other{number}", files_of("", runs[2:], None, scene=other))
         if start == 1:
             assert len(merged(tmp_path / "base", tmp_path / f"other{number}")["variants"]) == 4
             continue
@@ -356,7 +357,7 @@ def test_sweeps_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
         assert "\n" not in str(error.value)
     # More samples of the same sequence are no contradiction.
     assert len(merged(first, folder(tmp_path / "g", [ended(9)], longer))["variants"]) == 5
-    write(tmp_path / "h", "another_case", runs, None)
+    write_files(tmp_path / "h", files_of("another_case", runs, None))
     with pytest.raises(InputError, match="they differ in the case"):
         merged(first, tmp_path / "h")
     with pytest.raises(InputError, match="holds no sweep"):

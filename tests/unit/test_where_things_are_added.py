@@ -156,7 +156,7 @@ def test_a_study_is_a_verb_with_a_scene_and_a_table() -> None:
         told = said("speeds", CASE, f"{SPEED}=210", "--set", f"{SPEED}=200", "--force")
         assert told == [["v", "[km/h]", "dt"], ["210.0", "0.002"]]
         petsc = invoke("speeds", CASE, "--", "-log_view")
-        assert petsc.exit_code == 2 and "only run takes those" in petsc.stderr
+        assert petsc.exit_code == 2 and "this verb takes none" in petsc.stderr
         without = invoke("speeds")
         assert without.exit_code == 2 and "Missing argument" in without.stderr
         (both,) = invoke(

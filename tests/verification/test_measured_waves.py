@@ -22,7 +22,8 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.studies.waves.excited import Settings, Watch, excitation_of, without_train
+from catenary.cases.studies.asked import Excited
+from catenary.cases.studies.waves.excited import Watch, excitation_of, without_train
 from catenary.cases.studies.waves.measured import arrived, measured_rows, transmitted
 from catenary.cases.studies.waves.seen import EnergyMotion, EnergySeen, NodeMotion, WireMotion
 from catenary.cases.studies.waves.study import study_excited
@@ -74,7 +75,7 @@ def test_group_velocities_of_a_periodic_line_are_those_of_its_bloch_waves() -> N
     """
     line = en50318_line(44)
     problem = problem_of(line, WHOLE)
-    struck = excitation_of("hammer", Settings(impulse=0.2), problem, 1e-3)
+    struck = excitation_of("hammer", Excited(impulse=0.2), problem, 1e-3)
     rest = line_at_rest(without_train(problem, struck), mesh_of(line, 8))
     wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
     march(rest, struck, 4e-3, [wire])
@@ -103,9 +104,7 @@ def test_a_rail_sends_energy_at_its_group_velocity(tmp_path: Path) -> None:
     Average acceleration slows waves of 6.4 Hz by (w dt)^2 / 4 = 0.04 %.
     """
     own = ["line.n_spans=60", "evaluation.from_m=85", "evaluation.to_m=93.5"]
-    text, _ = study_excited(
-        load_scene("conductor_rail", own), "hammer", Settings(), tmp_path, False
-    )
+    text, _ = study_excited(load_scene("conductor_rail", own), "hammer", Excited(), tmp_path, False)
     found = [line for line in text.splitlines() if line.startswith("group velocity")]
     assert len(found) == 2, text
     seen, expected = (float(line.split()[-2]) for line in found)
@@ -120,7 +119,7 @@ def test_what_passes_lies_in_the_pass_bands() -> None:
     """
     line = en50318_line(44)
     problem = problem_of(line, WHOLE - {"dropper_slackening"})
-    struck = excitation_of("hammer", Settings(impulse=0.2), problem, 1e-3)
+    struck = excitation_of("hammer", Excited(impulse=0.2), problem, 1e-3)
     rest = line_at_rest(without_train(problem, struck), mesh_of(line, 4))
     wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
     march(rest, struck, 4e-3, [wire])

@@ -10,6 +10,7 @@ from scenes import load_scene
 from catenary import InputError
 from catenary.cases.studies.sweep.variants import whole_numbers
 from catenary.cases.studies.waves import window_error
+from catenary.postproc.report.study_table import write_files
 
 # The paper's line with average damping, on which waves fade within a few spans.
 SHORT = (
@@ -28,7 +29,7 @@ def test_the_error_falls_with_the_size_of_the_window(tmp_path: Path) -> None:
     assert all(abs(one.sigma) <= one.history for one in curve.errors)
     told = window_error.as_text([curve])
     assert "chosen by the program" in told.splitlines()[-1] and "REMARK" not in told
-    names = {path.name for path in window_error.write(tmp_path, [curve])}
+    names = {path.name for path in write_files(tmp_path, window_error.files_of([curve]))}
     assert names == {"window_error.csv", "window_error.png"}
     rows = (tmp_path / "window_error.csv").read_text().splitlines()
     assert len(rows) == 4 and rows[0].startswith("with,spans_ahead")

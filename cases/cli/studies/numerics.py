@@ -18,6 +18,7 @@ from catenary.cases.cli.app import (
     SceneWords,
     StudyRuns,
     folder_option,
+    print_findings,
     serial_verb,
     verb,
 )
@@ -87,19 +88,16 @@ def accuracy(
         return plan, options
 
     comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene)
-    from catenary.base.parallel import on_root
-    from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.studies.accuracy import output as accuracy_output
+    from catenary.cases.studies.accuracy import output
     from catenary.cases.studies.accuracy import runs as study
+    from catenary.cases.studies.records import held_study
     from catenary.postproc.evaluate.wording import counted
 
-    with held(out, comm, f"catenary accuracy {words.case}"):
+    with held_study(out, comm, f"catenary accuracy {words.case}") as held:
         found, ended = study.run(plan, out, comm, options)
-        files = on_root(comm, lambda: accuracy_output.write(found, out, wanted), takes_long=True)
-    console.say("\n" + accuracy_output.as_text(found, wanted))
-    console.say(
-        f"\n{counted(len(ended), 'run')}, {found.wall:.0f} s\n" + "\n".join(map(str, files))
-    )
+        files = held.write(lambda: output.files_of(found, wanted))
+    time_of_all = f"{counted(len(ended), 'run')}, {found.wall:.0f} s"
+    print_findings(f"{output.as_text(found, wanted)}\n\n{time_of_all}", files)
     return console.DONE
 
 
@@ -145,7 +143,7 @@ def hard(
     from catenary.cases.studies.records import held_study
     from catenary.cases.terminal.runs_bar import RunsBar
     from catenary.postproc.evaluate.wording import counted
-    from catenary.postproc.report.study_table import Content, remark_lines, write_files
+    from catenary.postproc.report.study_table import remark_lines
 
     if comm.size > 1 and runs.n_jobs != 1:
         raise InputError(
@@ -154,9 +152,9 @@ def hard(
     found: list[Criterion] = []
     remarks_of: dict[str, dict[str, list[str]]] = {}
     petsc = partial(start_petsc, list(options.petsc))
-    with held_study(out, comm, "catenary hard", runs.force) as (kept, write):
+    with held_study(out, comm, "catenary hard", runs.force) as held:
         checked = checks.check_cases(
-            cases, comm, shortened, kept, at_once(runs.n_jobs, comm), petsc
+            cases, comm, shortened, held.kept, at_once(runs.n_jobs, comm), petsc
         )
         with RunsBar(len(cases) if console.speaks() else 0, console.say, what="hard cases") as bar:
             for number, case in enumerate(cases, start=1):
@@ -166,9 +164,12 @@ def hard(
                 bar.ended()
                 found += rows
         table, page = TABLES
-        content: dict[str, Content] = {table: checks.criteria(found, remarks_of)}
-        content[page] = checks.page(cases, found, remarks_of)
-        files = write(lambda folder: write_files(folder, content))
+        files = held.write(
+            lambda: {
+                table: checks.criteria(found, remarks_of),
+                page: checks.page(cases, found, remarks_of),
+            }
+        )
     failed = [row for row in found if not row.passed]
     lines = remark_lines(march for remarks in remarks_of.values() for march in remarks.items())
     if lines:
@@ -205,17 +206,16 @@ def stability_map(
     from catenary.cases.scene.load import read_draft
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.stability import map as study
-    from catenary.postproc.report.study_table import Content, write_files
 
     refuse_table(out / MAP, force)
     grid, comm = study.QUICK if quick else study.Grid(), console.alone()
     draft = read_draft(words.case, words.changes, words.shortened)
-    with held_study(out, comm, f"catenary stability-map {words.case}", force) as (kept, write):
-        found = study.make_map(draft, comm, grid, console.say, kept, at_once(n_jobs, comm))
-        content: dict[str, Content] = {MAP: study.as_rows(found)}
-        content[MAP_PICTURE] = lambda: study.draw(found)
-        files = write(lambda folder: write_files(folder, content))
-    console.say("\n" + study.as_text(found) + "\n" + "\n".join(map(str, files)))
+    with held_study(out, comm, f"catenary stability-map {words.case}", force) as held:
+        found = study.make_map(draft, comm, grid, console.say, held.kept, at_once(n_jobs, comm))
+        files = held.write(
+            lambda: {MAP: study.as_rows(found), MAP_PICTURE: lambda: study.draw(found)}
+        )
+    print_findings(study.as_text(found), files)
     return console.DONE if all(one.agrees for one in found.limits) else console.NOT_ACCEPTED
 
 

@@ -9,14 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.cases.cli.app import (
-    Assignments,
-    Case,
     Force,
     Jobs,
-    MoreAssignments,
     Out,
     SceneWords,
-    Shortened,
     print_findings,
     serial_verb,
 )
@@ -29,18 +25,14 @@ if TYPE_CHECKING:
     from catenary.optimising import Made
 
 
-@dataclass
-class TaskWords:
+@dataclass(kw_only=True)
+class TaskWords(SceneWords):
     """A case, the task of a study over a set of its scenes, and how that is made."""
 
-    case: Case
     task_file: Annotated[
         Path, typer.Argument(metavar="FILE", help="TOML file with the task.", show_default=False)
     ]
     out: Out
-    extras: MoreAssignments = None
-    assignments: Assignments = None
-    shortened: Shortened = False
     n_jobs: Jobs = 1
     force: Force = False
 
@@ -50,8 +42,7 @@ class TaskWords:
         from catenary.cases.scene.load import read_draft
 
         def read() -> tuple[Draft, Path]:
-            words = SceneWords(self.case, self.extras, self.assignments, self.shortened)
-            return read_draft(words.case, words.changes, words.shortened), self.task_file
+            return read_draft(self.case, self.changes, self.shortened), self.task_file
 
         made = study(
             read,
@@ -62,7 +53,7 @@ class TaskWords:
             warn=console.warn,
             say=console.say,
         )
-        print_findings(str(made), made.files)
+        print_findings(made.text, made.files)
         return console.DONE
 
 

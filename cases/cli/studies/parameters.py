@@ -9,17 +9,15 @@ import typer
 
 from catenary.cases.cli import completion
 from catenary.cases.cli.app import (
-    Assignments,
-    Case,
     Force,
-    MoreAssignments,
     Out,
     SceneWords,
-    Shortened,
     folder_option,
+    leave,
     serial_verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_table
+from catenary.cases.studies.asked import Frequencies
 from catenary.cases.terminal import console
 
 
@@ -32,6 +30,7 @@ from catenary.cases.terminal import console
 )
 def pantograph(
     words: SceneWords,
+    over: Frequencies,
     kind: Annotated[
         str | None,
         typer.Option(
@@ -51,38 +50,22 @@ def pantograph(
             help="Masses of the lumped model, 1 to 3; if absent two, or a lumped pantograph's own.",
         ),
     ] = None,
-    low: Annotated[float, typer.Option("--from", metavar="HZ", help="Lowest frequency.")] = 0.1,
-    high: Annotated[float, typer.Option("--to", metavar="HZ", help="Highest frequency.")] = 25.0,
-    points: Annotated[
-        int, typer.Option("--points", metavar="N", help="Frequencies between them, geometric.")
-    ] = 250,
-    fit_low: Annotated[
-        float,
-        typer.Option(
-            "--fit-from",
-            metavar="HZ",
-            help="Lowest frequency of the fit; below it the response is that of the lift.",
-        ),
-    ] = 0.5,
     force: Force = False,
 ) -> None:
     """Serial."""
     from catenary.cases.studies.pantograph_response import (
         FILES,
-        Range,
+        files_of,
         study,
         study_text,
-        write_study,
     )
 
-    over = Range(low, high, points, fit_low).checked()
+    over.checked()
     if out is not None:
         for name in FILES:
             refuse_table(out / name, force)
     found = study(words.load(), kind, masses, over)
-    console.say(study_text(found))
-    if out is not None:
-        console.say("\n" + "\n".join(str(path) for path in write_study(found, out)))
+    leave(out, study_text(found), lambda: files_of(found))
 
 
 @serial_verb(
@@ -139,9 +122,7 @@ def sensitivity(
         found = rest_derivatives(scene, keys or [], droppers=droppers)
     else:
         found = derivatives(scene, keys or [], droppers=droppers, progress=not console.is_quiet())
-    console.say(found.text)
-    if out is not None:
-        console.say(f"\n{found.write(out)[0]}")
+    leave(out, found.text, lambda: {found.file: found.rows})
     return console.DONE
 
 
@@ -154,7 +135,7 @@ def sensitivity(
     epilog="Example: catenary identify ac_simple measured.csv task.toml -o results/identified",
 )
 def identify(
-    case: Case,
+    words: SceneWords,
     measured: Annotated[
         Path, typer.Argument(help="CSV file of a passage: places or times, forces, head heights.")
     ],
@@ -166,20 +147,16 @@ def identify(
         ),
     ],
     out: Out,
-    extras: MoreAssignments = None,
-    assignments: Assignments = None,
-    shortened: Shortened = False,
     force: Force = False,
 ) -> int:
     """Serial."""
-    from catenary.identifications import identified, task_of, write_identified
+    from catenary.identifications import identified, identified_files, task_of
 
     wanted = task_of(task)
-    scene = SceneWords(case, extras, assignments, shortened).scene()
+    scene = words.scene()
     from catenary.cases.studies.identification.output import PARAMETERS
 
     refuse_table(out / PARAMETERS, force)
     found = identified(scene, measured, wanted, console.say)
-    console.say(f"\n{found}\n")
-    console.say("\n".join(map(str, write_identified(found, out))))
+    leave(out, f"\n{found}", lambda: identified_files(found))
     return console.DONE

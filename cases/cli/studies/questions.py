@@ -14,40 +14,30 @@ from catenary.cases.cli.app import (
     RunWords,
     StudyRuns,
     folder_option,
+    leave,
     print_findings,
     records_of,
     serial_verb,
     verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
+from catenary.cases.studies.asked import Distances, Speeds
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import Job
     from catenary.cases.studies.sweep.together import Marching
 
 
-def _begun(
-    words: RunWords,
-    table: str,
-    out: Path | None,
-    check: Callable[[], object],
-    runs: StudyRuns,
-) -> tuple[Marching, Scene]:
-    """The march of variants of a case, and its scene. Collective.
+def _begun(words: RunWords, table: str, out: Path | None, runs: StudyRuns) -> Marching:
+    """The march of variants of a case by a question that leaves a ``table`` in the folder ``out``.
 
-    Parameters
-    ----------
-    table : that the question leaves in the folder ``out``
-    check : raises InputError if what is asked for is impossible
+    Collective.
     """
 
     def read() -> tuple[tuple[Draft, Scene], list[str]]:
-        check()
         if out is not None:
             refuse_table(out / table, runs.force)
         draft, options = words.draft()
@@ -56,7 +46,7 @@ def _begun(
     comm, (draft, scene), options = runs.begin(read, lambda made: made[1])
     from catenary.cases.studies.sweep.together import Marching
 
-    return Marching(draft, out, comm, options), scene
+    return Marching(draft, scene, out, comm, options)
 
 
 class Direction(StrEnum):
@@ -75,18 +65,7 @@ class Direction(StrEnum):
 )
 def speed(
     words: RunWords,
-    slowest: Annotated[
-        float, typer.Option("--from", metavar="KM_H", help="Lowest speed [km/h].")
-    ] = 200.0,
-    fastest: Annotated[
-        float, typer.Option("--to", metavar="KM_H", help="Highest speed [km/h].")
-    ] = 360.0,
-    step: Annotated[
-        float, typer.Option(metavar="KM_H", help="Step of the speeds that are run first [km/h].")
-    ] = 10.0,
-    within: Annotated[
-        float, typer.Option(metavar="KM_H", help="Bisect the speed to this accuracy [km/h].")
-    ] = 1.0,
+    speeds: Speeds,
     criterion: Annotated[
         list[str] | None,
         typer.Option(
@@ -108,13 +87,12 @@ def speed(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.questions.highest_speed import Speeds
     from catenary.questions import find_speeds
 
-    speeds, command = Speeds(slowest, fastest, step, within), f"catenary speed {words.case}"
-    marching, scene = _begun(words, "speed.csv", out, speeds.first, runs)
-    found = find_speeds(marching, scene, speeds, criterion or [], direction, command)
-    print_findings(str(found), found.files)
+    speeds.first()
+    marching, command = _begun(words, "speed.csv", out, runs), f"catenary speed {words.case}"
+    found = find_speeds(marching, speeds, criterion or [], direction, command)
+    print_findings(found.text, found.files)
     return console.DONE
 
 
@@ -128,13 +106,7 @@ def speed(
 )
 def separation(
     words: RunWords,
-    nearest: Annotated[
-        float, typer.Option("--from", metavar="M", help="Shortest distance [m].")
-    ] = 31.0,
-    farthest: Annotated[
-        float, typer.Option("--to", metavar="M", help="Longest distance [m].")
-    ] = 400.0,
-    step: Annotated[float, typer.Option(metavar="M", help="Step between distances [m].")] = 1.0,
+    distances: Distances,
     out: Annotated[
         Path | None,
         folder_option("Folder for table and picture; without it nothing is written."),
@@ -143,13 +115,12 @@ def separation(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.questions.separation import Distances
     from catenary.questions import find_separations
 
-    distances, command = Distances(nearest, farthest, step), f"catenary separation {words.case}"
-    marching, scene = _begun(words, "separation.csv", out, distances.values, runs)
-    found = find_separations(marching, scene, distances, command)
-    print_findings(str(found), found.files)
+    distances.values()
+    marching = _begun(words, "separation.csv", out, runs)
+    found = find_separations(marching, distances, f"catenary separation {words.case}")
+    print_findings(found.text, found.files)
     return console.DONE
 
 
@@ -183,16 +154,14 @@ def what_if(
         return (jobs, changes), options
 
     comm, (jobs, changes), options = runs.begin(read, lambda made: made[0][0].scene)
-    from catenary.cases.result_folder.folder_lock import held
+    from catenary.cases.studies.records import held_study
 
     with ExitStack() as stack:
         folder = out or stack.enter_context(temporary_folder(comm, "what_if"))
-        stack.enter_context(held(folder, comm, f"catenary what-if {words.case}"))
+        held = stack.enter_context(held_study(out, comm, f"catenary what-if {words.case}"))
         ended = question.run(jobs, folder, comm, options)
         found = on_root(comm, lambda: question.differences(changes, ended, folder), takes_long=True)
-        files = []
-        if out is not None:
-            files = on_root(comm, lambda: question.write(folder, found), takes_long=True)
+        files = held.write(lambda: question.files_of(folder, found))
     print_findings(question.as_text(found), files)
     return console.DONE
 
@@ -220,10 +189,7 @@ def worst(
     console.alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.questions.worst_output import answer_of
     from catenary.postproc.read.results import Results
-    from catenary.postproc.report.study_table import write_files
 
     with Results(folder, records) as results:
         text, tables = answer_of(results, count)
-    console.say(text)
-    if out is not None:
-        console.say("\n" + "\n".join(map(str, write_files(out, tables))))
+    leave(out, text, lambda: tables)

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.base.errors import InputError
 from catenary.cases.cli.app import (
     Force,
     Out,
     Strict,
     StudyRuns,
     folder_option,
+    leave,
+    print_findings,
     serial_verb,
     verb,
 )
@@ -53,16 +56,15 @@ def reference(
         return (chosen, jobs_of(chosen)), []
 
     comm, (chosen, jobs), options = runs.begin(read, lambda made: made[1][0].scene)
-    from catenary.base.parallel import on_root
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy.runs import RUNS, measure
+    from catenary.cases.studies.records import held_study
     from catenary.cases.studies.reference import solutions
     from catenary.cases.studies.sweep.jobs import all_ended
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
-    with held(out, comm, "catenary reference"):
+    with held_study(out, comm, "catenary reference") as held:
         ended = all_ended(run_jobs(jobs, out / RUNS, comm, options, measure=measure))
-        files = on_root(comm, lambda: solutions.write(out, chosen, ended), takes_long=True)
+        files = held.write(lambda: solutions.files_of(chosen, ended))
     console.say("\n".join(map(str, files)))
     return console.DONE
 
@@ -106,9 +108,9 @@ def judge(
     from catenary.cases.studies.reference.others_results import read_results
 
     found = read_results(files, configuration, not unfiltered)
-    console.say(pages.judged_text(found))
-    if out is not None:
-        console.say("\n".join(map(str, pages.write_judged(out, found))))
+    if unfiltered and not any(one.forces for one in found):
+        raise InputError("--unfiltered belongs to forces over time; these files hold statistics")
+    leave(out, pages.judged_text(found), lambda: pages.judged_files(found))
     return console.NOT_ACCEPTED if strict and any_failed(pages.rows_of(found)) else console.DONE
 
 
@@ -142,16 +144,16 @@ def validate(
 
     comm, (jobs, tested), options = runs.begin(read, lambda made: made[0][0].scene)
     from catenary.base.parallel import on_root
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies.accuracy.runs import RUNS
+    from catenary.cases.studies.records import held_study
     from catenary.cases.studies.reference import pages
     from catenary.cases.studies.reference.judgement import any_failed
     from catenary.cases.studies.sweep.jobs import all_ended
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
-    with held(out, comm, "catenary validate"):
+    with held_study(out, comm, "catenary validate") as held:
         ended = all_ended(run_jobs(jobs, out / RUNS, comm, options), "validation")
         found = on_root(comm, lambda: study.validate(ended, tested), takes_long=True)
-        files = on_root(comm, lambda: pages.write_validation(out, found), takes_long=True)
-    console.say("\n" + pages.validation_text(found) + "\n\n" + "\n".join(map(str, files)))
+        files = held.write(lambda: pages.validation_files(found))
+    print_findings(pages.validation_text(found), files)
     return console.NOT_ACCEPTED if strict and any_failed(found.rows) else console.DONE

@@ -18,6 +18,7 @@ from catenary.cases.cli.app import (
     StudyRuns,
     Vary,
     folder_option,
+    leave,
     print_findings,
     serial_verb,
     verb,
@@ -28,9 +29,9 @@ from catenary.cases.terminal import console
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from catenary.cases.studies.planned_sweep import PlannedSweep
     from catenary.cases.studies.sweep.jobs import Ended
     from catenary.cases.studies.sweep.variants import Variant
-    from catenary.sweeps import PlannedSweep
 
 _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 
@@ -96,10 +97,15 @@ def sweep(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
+    from catenary.cases.studies.planned_sweep import plan_sweep
     from catenary.cases.studies.sweep.jobs import STATISTICS, check_names, parse_part
-    from catenary.sweeps import plan_sweep, samples_of
+    from catenary.sweeps import samples_of
 
     own = None if part is None else parse_part(part)
+    if own is not None and (plotted is not None or histogram):
+        raise InputError(
+            "a part has no pictures: leave --plot and --histogram to the sweep after all parts"
+        )
 
     def read() -> tuple[PlannedSweep, list[str]]:
         draft, options = words.draft()
@@ -137,7 +143,7 @@ def sweep(
         return verdict(made.run_part(own, comm, options), "sweep")
     command = f"catenary sweep {words.case}"
     found = made.run(comm, options, command, _names(plotted), histogram)
-    print_findings(str(found), found.files)
+    print_findings(found.text, found.files)
     return verdict(found.ended, "sweep")
 
 
@@ -241,14 +247,13 @@ def uncertainty(
     ] = None,
 ) -> None:
     """Serial."""
-    from catenary.estimates import write_uncertainty
+    from catenary.estimates import estimate_files
 
     if out is not None:
         refuse_impossible(out)
     found = catenary.uncertainty(table, sample)
-    files = write_uncertainty(found, out or (table if table.is_dir() else table.parent))
-    console.say(str(found))
-    console.say("\n" + "\n".join(str(path) for path in files))
+    folder = out or (table if table.is_dir() else table.parent)
+    leave(folder, str(found), lambda: estimate_files(found))
 
 
 @serial_verb(

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli.app import Force, SceneWords, folder_option, serial_verb
+from catenary.cases.cli.app import Force, SceneWords, folder_option, leave, serial_verb
 from catenary.cases.result_folder.output_folder import (
     refuse_impossible,
     refuse_table,
     run_folder,
 )
+from catenary.cases.studies.asked import Excited
 from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
@@ -31,31 +32,6 @@ class WaveWords(SceneWords):
         str,
         typer.Argument(help="A case, which is run with a snapshot every 10 ms, or a run's folder."),
     ]
-
-
-@dataclass
-class Excited:
-    """Excitation of the line in place of a train; None stands for the usual value."""
-
-    force_n: Annotated[
-        float | None,
-        typer.Option("--force-N", help="Moving force or pulse; the static force if absent."),
-    ] = None
-    frequency_hz: Annotated[
-        float | None,
-        typer.Option("--frequency-Hz", help="Frequency of a moving force; constant if absent."),
-    ] = None
-    at_m: Annotated[
-        float | None,
-        typer.Option("--at-m", help="Place of a pulse or hammer; mid-line if absent."),
-    ] = None
-    duration_s: Annotated[
-        float | None,
-        typer.Option("--duration-s", help="Duration of a pulse (0.1 if absent) or hammer (0.02)."),
-    ] = None
-    impulse_ns: Annotated[
-        float | None, typer.Option("--impulse-Ns", help="Impulse of a hammer; 10 if absent.")
-    ] = None
 
 
 @serial_verb(
@@ -108,13 +84,12 @@ def waves(
     """Serial."""
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.studies.waves import study
-    from catenary.cases.studies.waves.excited import Settings
 
-    folder, settings = run_folder(words.case), Settings(*astuple(excited))
+    folder = run_folder(words.case)
     if excite not in EXCITATIONS:
         raise InputError(f"--excite is {excite}, but must be one of {', '.join(EXCITATIONS)}")
     train = excite == EXCITATIONS[0]
-    if train and any(value is not None for value in settings):
+    if train and any(value is not None for value in astuple(excited)):
         raise InputError(
             "--force-N, --frequency-Hz, --at-m, --duration-s and --impulse-Ns belong to another "
             "--excite than pantograph; the scene says all about that"
@@ -146,7 +121,7 @@ def waves(
         if obstacles:
             text, files = study.study_obstacles(scene, out, force)
         elif not train:
-            text, files = study.study_excited(scene, excite, settings, out, force)
+            text, files = study.study_excited(scene, excite, excited, out, force)
         elif _run(scene, out, force):
             text, files = study.study_waves(out)
         else:
@@ -175,8 +150,7 @@ def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force
     scenes = scenes or [("", words.load())]
     start_petsc([])
     curves = [window_error.curve_of(name, scene, sizes) for name, scene in scenes]
-    files = window_error.write(out, curves)
-    console.say(window_error.as_text(curves) + "\n" + "\n".join(map(str, files)))
+    leave(out, window_error.as_text(curves), lambda: window_error.files_of(curves))
     return console.DONE
 
 

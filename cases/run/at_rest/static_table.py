@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +25,7 @@ from catenary.postproc.channels.header import line_datasets, static_datasets
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.registration import Registration
+from catenary.postproc.report.study_table import json_text
 from catenary.solver.effects.all_effects import with_defects
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
@@ -164,23 +164,17 @@ def write_static(path: Path, table: Mapping[str, Any], registration: bool = Fals
     arms = Registration.of(table, wires) if registration else None
     if registration and arms is None:
         raise InputError("--registration: no steady arm pulls a wire sideways; give line.stagger_m")
-    try:
-        with path.open("w", encoding="utf-8", newline="") as stream:
-            if path.suffix == ".json":
-                plain = {name: np.asarray(value).tolist() for name, value in table.items()}
-                json.dump(plain, stream, indent=1)
-                stream.write("\n")
-                return
-            if arms is not None:
-                stream.write(arms.csv())
-                return
-            columns = [np.asarray(table[name]) for name in (*DROPPER_COLUMNS, *DROPPER_WIRES)]
-            rows = (
-                (int(span) + 1, f"{x:.4f}", f"{length:.5f}", f"{force:.3f}", upper, lower)
-                for span, x, length, force, upper, lower in zip(*columns, strict=True)
-            )
-            stream.write(csv_text(_DROPPER_HEADS, rows))
-    except OSError as error:
-        from catenary.postproc.files.disk import unwritten  # loads HDF5
+    if path.suffix == ".json":
+        text = json_text(table)
+    elif arms is not None:
+        text = arms.csv()
+    else:
+        columns = [np.asarray(table[name]) for name in (*DROPPER_COLUMNS, *DROPPER_WIRES)]
+        rows = (
+            (int(span) + 1, f"{x:.4f}", f"{length:.5f}", f"{force:.3f}", upper, lower)
+            for span, x, length, force, upper, lower in zip(*columns, strict=True)
+        )
+        text = csv_text(_DROPPER_HEADS, rows)
+    from catenary.postproc.files.disk import write_into  # loads HDF5
 
-        raise unwritten(path, error) from error
+    write_into(path.parent, {path.name: text})

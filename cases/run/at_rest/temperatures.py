@@ -132,12 +132,10 @@ def temperatures(scene: Scene, differences: Sequence[float], picture: Path | Non
     rests = over_temperatures(problem, mesh, differences)
     if picture is not None:
         # Matplotlib takes long to import.
+        from catenary.postproc.files.disk import write_into
+        from catenary.postproc.report.pictures.figures import file_of
         from catenary.postproc.report.pictures.line_pictures import draw_temperatures
 
-        try:
-            draw_temperatures(rests, picture)
-        except OSError as error:
-            from catenary.postproc.files.disk import unwritten  # loads HDF5
-
-            raise unwritten(picture, error) from error
+        drawn = file_of(draw_temperatures(rests), picture.name)
+        write_into(picture.parent, {picture.name: drawn})
     return temperature_text(rests, problem.along.tensioner.ratio)

@@ -165,9 +165,10 @@ def pantographs(scene: Scene) -> list[Level]:
 
 def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
     """All pantographs of the train as chains fitted to a kind, as the verb ``pantograph`` does."""
-    from catenary.cases.studies.pantograph_response import Range, inline_table, study
+    from catenary.cases.studies.asked import Frequencies
+    from catenary.cases.studies.pantograph_response import inline_table, study
 
-    found = study(scene, kind, n_masses, Range(0.1, 25.0, 2, _SMALLEST_FIT))
+    found = study(scene, kind, n_masses, Frequencies(n_points=2, fit_low=_SMALLEST_FIT))
     name = f"fitted_{n_masses}"
     assignments = [f"pantographs.{name}={inline_table(found)}"]
     for place in range(len(scene.train.pantographs)):
@@ -237,7 +238,8 @@ def parse_axes(text: str | None) -> list[Axis]:
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in AXES:
-            raise InputError(f"--axes {shown(name)[1:-1]} is unknown; there are {', '.join(AXES)}")
+            told = shown(name)[1:-1] or shown(name)
+            raise InputError(f"--axes {told} is unknown; there are {', '.join(AXES)}")
         if names.count(name) > 1:
             raise InputError(f"--axes names {name} twice")
     return [AXES[name] for name in names]

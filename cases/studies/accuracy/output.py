@@ -6,7 +6,6 @@ import math
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,6 @@ from catenary.postproc.report.study_table import (
     Content,
     StudyTable,
     remark_lines,
-    write_files,
 )
 
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
@@ -44,8 +42,8 @@ _ROOM = np.array([50.0, 12.0])
 _MARGIN = 0.09
 
 
-def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
-    """Write table, record, page and diagram; returns the files. Not collective.
+def files_of(found: Measured, target: float) -> dict[str, Content]:
+    """Table, record, page and diagram. Not collective.
 
     Advice is for errors of at most ``target`` [%]. The diagram is left out if no axis of
     discretisation was varied.
@@ -55,7 +53,7 @@ def write(found: Measured, out_dir: Path, target: float) -> list[Path]:
     if drawn:
         content[PICTURE] = lambda: draw(found)
     content[PAGE] = page(found, advices(found, target), PICTURE if drawn else "")
-    return write_files(out_dir, content)
+    return content
 
 
 def table_of(rows: Sequence[Row], axis: Axis | None = None) -> StudyTable:

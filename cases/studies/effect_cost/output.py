@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from catenary.cases.studies.effect_cost.study import FIGURES, UPLIFT, Costs, Measured, Size
 from catenary.postproc.evaluate.wording import counted, fixed
-from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
+from catenary.postproc.report.study_table import Column, Content, StudyTable, remark_lines
 
 TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
 # In the column "simulated": the scene simulates the effect.
@@ -235,7 +234,6 @@ def record_of(found: Costs) -> dict[str, Any]:
     }
 
 
-def write(found: Costs, folder: Path) -> list[Path]:
-    """Write table, record and text into a folder; returns the files. Not collective."""
-    text = as_text(found) + "\n"
-    return write_files(folder, {TABLE: table_of(found), RECORD: record_of(found), TEXT: text})
+def files_of(found: Costs) -> dict[str, Content]:
+    """Table, record and text. Not collective."""
+    return {TABLE: table_of(found), RECORD: record_of(found), TEXT: as_text(found) + "\n"}

@@ -19,6 +19,14 @@ from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
 
+class Size(NamedTuple):
+    """Unknowns of a line, of its stations (fewest, most), and of a cross-section by planes."""
+
+    n_unknowns: int
+    of_a_station: tuple[int, int]
+    planes: tuple[int, ...]
+
+
 class RepeatedMarch:
     """A march over some steps that starts again and again from one of its states.
 
@@ -46,10 +54,10 @@ class RepeatedMarch:
             problem = replace(problem, train=replace(train, end=end))
         self._comm = comm
         self._march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
-        self.n_unknowns = at_rest.model.numbering.n_unknowns
-        self.widths = self._march.station_widths
-        makes = at_rest.model.numbering.station_types
-        self.unknowns_of_a_station = min(map(len, makes)), max(map(len, makes))
+        numbering = at_rest.model.numbering
+        of_stations = list(map(len, numbering.station_types))
+        fewest_and_most = min(of_stations), max(of_stations)
+        self.size = Size(numbering.n_unknowns, fewest_and_most, self._march.station_widths)
         kept = _Kept(first)
         outcome = self._march.run([kept])
         if outcome.outcome != "done":

@@ -16,11 +16,12 @@ from catenary.base.mpi import MPI
 from catenary.cases.process.interrupts import Phase
 from catenary.cases.run.prepared import rest_of
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
+from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.problem import end_of, problem_of
 from catenary.cases.scene.scene import Scene
-from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside, in_turns
+from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, Size, beside, in_turns
 from catenary.cases.studies.sweep.jobs import (
     Ended,
     Job,
@@ -151,15 +152,6 @@ class CostOptions:
 
 
 @dataclass(frozen=True)
-class Size:
-    """Unknowns of a line, of its stations (fewest, most), and of a cross-section by planes."""
-
-    n_unknowns: int
-    of_a_station: tuple[int, int]
-    planes: tuple[int, ...]
-
-
-@dataclass(frozen=True)
 class Measured:
     """A scene with one effect switched, beside the scene as it is; or the latter.
 
@@ -253,7 +245,8 @@ def _named(effects: SwitchableEffects, names: Sequence[str]) -> list[Switch]:
         if name in effects.always:
             raise InputError(f"--only {name}: it is part of every scene and cannot be left out")
         if name not in known:
-            raise InputError(f"--only {name} is no effect; there are {', '.join(known)}")
+            told = shown(name)[1:-1] or shown(name)
+            raise InputError(f"--only {told} is no effect; there are {', '.join(known)}")
     return [known[name] for name in dict.fromkeys(names)]
 
 
@@ -331,11 +324,11 @@ def measure(
                 rows.append(Measured(switch, outcome))
                 continue
             with RepeatedMarch(comm, rest_of(job.scene), first, n_steps) as march:
-                timed, own = beside(march, as_it_is, options.rounds), size_of(march)
+                timed, own = beside(march, as_it_is, options.rounds), march.size
             figures = statistics_of(one.summary)
             rows.append(Measured(switch, "done", own, timed.ratio, figures, one.remarks))
             step = min(step, timed.least_of_other)
-        size = size_of(as_it_is)
+    size = as_it_is.size
     unchanged = Measured(UNSWITCHED, "done", size, 1.0, statistics_of(whole.summary), whole.remarks)
     names = [one["name"] for one in whole.summary["pantographs"]]
     stretch = scene.evaluation.from_m, scene.evaluation.to_m
@@ -351,8 +344,3 @@ def _round_of(problem: Problem) -> tuple[int, int]:
     begin = round((problem.evaluation[0] - train.start) / train.speed / dt)
     first = max(0, min(begin, steps_of(problem) - n_steps))
     return first, min(n_steps, steps_of(problem) - first)
-
-
-def size_of(march: RepeatedMarch) -> Size:
-    """The size of a line that is marched. Not collective."""
-    return Size(march.n_unknowns, march.unknowns_of_a_station, march.widths)

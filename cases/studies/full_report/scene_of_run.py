@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from catenary.cases.studies.accuracy import output as accuracy
 from catenary.cases.studies.accuracy.runs import physics_of
 from catenary.cases.studies.effect_cost import output as effect_cost
 from catenary.cases.studies.records import read_study
+from catenary.cases.studies.sweep.same_scene import differences
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.sections.run_facts import INPUT
 from catenary.solver.effects.all_effects import active, registry
@@ -150,16 +150,8 @@ def _rows_of(path: Path, verb: str, scene: Scene) -> list[dict[str, Any]]:
     if case != scene.case.name:
         raise InputError(f"{path} is a study of {case}, the run is one of {scene.case.name}")
     if record.get("scene"):
-        for key, there, here in _differences(record["scene"], physics_of(scene)):
-            raise InputError(f"{path} is a study with {key} = {there}, the run is one with {here}")
+        for key, there, here in differences(record["scene"], physics_of(scene)):
+            raise InputError(
+                f"{path} is a study with {key} = {shown(there)}, the run is one with {shown(here)}"
+            )
     return rows
-
-
-def _differences(study: Any, run: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Keys in which two scenes differ, with both values in words."""
-    if isinstance(study, dict) and isinstance(run, dict):
-        for name in dict.fromkeys((*study, *run)):
-            own = f"{key}.{name}" if key else name
-            yield from _differences(study.get(name), run.get(name), own)
-    elif study != run:
-        yield key, shown(study), shown(run)

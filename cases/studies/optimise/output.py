@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from catenary.cases.scene.keys.units import unit_of
@@ -19,7 +18,6 @@ from catenary.postproc.report.study_table import (
     Content,
     StudyTable,
     file_table,
-    write_files,
 )
 
 RECORD, PAGE, KEYS = "optimise.json", "optimise.md", "optimum.toml"
@@ -29,8 +27,8 @@ _PLACES = {"check": "check", "scene": "scene", "pantograph": "pantograph", "sear
            "outcome": ""}  # fmt: skip
 
 
-def write(out_dir: Path, plan: Plan, found: Sequence[Optimum]) -> list[Path]:
-    """Write all tables of an optimisation; returns the files. Not collective."""
+def files_of(plan: Plan, found: Sequence[Optimum]) -> dict[str, Content]:
+    """All tables of an optimisation. Not collective."""
     content: dict[str, Content] = {
         RECORD: record(plan, found),
         PAGE: markdown(plan, found),
@@ -40,7 +38,7 @@ def write(out_dir: Path, plan: Plan, found: Sequence[Optimum]) -> list[Path]:
         content[f"{DROPPERS}_{one.method}.csv"] = one.droppers
         content[f"{CHECKS}_{one.method}.csv"] = checks_table(one.rows)
         content[f"{HISTORY}_{one.method}.csv"] = history_table(plan, one.history)
-    return write_files(out_dir, content)
+    return content
 
 
 def record(plan: Plan, found: Sequence[Optimum]) -> dict[str, Any]:

@@ -9,11 +9,9 @@ the first, even division shows, and bisects each of their ends.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from itertools import groupby, product
-from math import ceil, inf, log10
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +22,7 @@ from catenary.base.options import option
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import BACKWARD, DIRECTIONS, FORWARD, has_mirrored_line, turned
+from catenary.cases.studies.asked import Speeds
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended
 from catenary.cases.studies.sweep.output import DIRECTION, remarks_of, table_of
 from catenary.cases.studies.sweep.together import Marching
@@ -31,7 +30,7 @@ from catenary.cases.studies.sweep.variants import VariedKey
 from catenary.cases.studies.sweep.variants import product as variants_of
 from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, Row, StudyTable, write_files
+from catenary.postproc.report.study_table import Column, Content, Row, StudyTable
 
 KEY = "train.speed_km_h"
 ALL, BOTH = "all criteria", "both"
@@ -43,59 +42,6 @@ _PANELS = (
     ("min_N", "minimum contact force"),
     ("max_uplift_mm", "contact-wire uplift"),
 )
-# Speeds of the first division at most, and the bounds of a scene's speed [km/h].
-MOST, _SLOWEST, _FASTEST = 2000, 1.0, 1000.0
-# Least distance of two speeds, which are whole multiples of a tenth of it [km/h].
-_CLOSEST = 1e-3
-
-
-class Speeds(NamedTuple):
-    """Speeds that are marched, all [km/h].
-
-    Attributes
-    ----------
-    slowest, fastest : ends of the range
-    step : distance of the first speeds
-    within : how closely ends of stretches are bisected
-    """
-
-    slowest: float = 200.0
-    fastest: float = 360.0
-    step: float = 10.0
-    within: float = 1.0
-
-    def first(self) -> list[float]:
-        """The even division, both ends in it.
-
-        Raises
-        ------
-        InputError
-            If the range is none, or the division too fine.
-        """
-        if not _SLOWEST <= self.slowest < self.fastest <= _FASTEST:
-            raise InputError(
-                f"{option('--from', 'slowest')} {self.slowest:g} {option('--to', 'fastest')} "
-                f"{self.fastest:g} is no range of speeds: give two ascending speeds from "
-                f"{_SLOWEST:g} to {_FASTEST:g} km/h"
-            )
-        step, within = option("--step", "step"), option("--within", "within")
-        if not _CLOSEST <= self.within <= self.step < inf:
-            raise InputError(
-                f"{within} {self.within:g} {step} {self.step:g} is not possible: {within} is at "
-                f"least {_CLOSEST:g} km/h and at most {step}"
-            )
-        count = ceil((self.fastest - self.slowest) / self.step - 1e-9) + 1
-        if count > MOST:
-            raise InputError(
-                f"{step} {self.step:g} makes {count} speeds; at most {MOST} are allowed"
-            )
-        evenly = [round(self.slowest + number * self.step, 4) for number in range(count - 1)]
-        return [*evenly, self.fastest]
-
-    @property
-    def form(self) -> str:
-        """Format of a speed that tells it from the next one, half of ``within`` away or more."""
-        return f".{max(1, ceil(-log10(0.5 * self.within)))}f"
 
 
 class Stretch(NamedTuple):
@@ -161,7 +107,6 @@ class SpeedStudy(NamedTuple):
 
 def find_speeds(
     marching: Marching,
-    scene: Scene,
     speeds: Speeds,
     wanted: Sequence[str],
     direction: str | None = None,
@@ -171,7 +116,7 @@ def find_speeds(
     Parameters
     ----------
     marching : of the case
-    scene : of the case, at its own speed
+    speeds : instead of the case's own
     wanted : parts of names of criteria, all criteria if there are none
     direction : "forward" or "backward"; both if None, as far as the scene can be turned
 
@@ -183,7 +128,8 @@ def find_speeds(
     Interrupted
         If a signal came.
     """
-    marched, alike, one_way = _directions(scene, direction)
+    case = marching.scene.case.name
+    marched, alike, one_way = _directions(marching.scene, direction)
     judged = DIRECTIONS if alike else marched
     ended: _Marched = {}
 
@@ -204,7 +150,7 @@ def find_speeds(
         march(more)
     found = tuple(_holds(ended, name, names, judged) for name in (ALL, *names))
     in_order = tuple(ended[place] for place in product(marched, _speeds(ended)))
-    return SpeedStudy(scene.case.name, speeds, marched, one_way, found, tuple(not_judged), in_order)
+    return SpeedStudy(case, speeds, marched, one_way, found, tuple(not_judged), in_order)
 
 
 def _directions(scene: Scene, wanted: str | None) -> tuple[tuple[str, ...], bool, str]:
@@ -408,12 +354,12 @@ def as_text(study: SpeedStudy) -> str:
     return "\n".join([*lines, *remarks_of(study.ended)])
 
 
-def write(folder: Path, study: SpeedStudy) -> list[Path]:
-    """Write tables, record and picture; returns the files. Not collective."""
+def files_of(study: SpeedStudy) -> dict[str, Content]:
+    """Tables, record and picture. Not collective."""
     criteria, runs = table_of_criteria(study), table_of(study.ended)
     record = {
         "case": study.case,
-        **{f"{name}_km_h": value for name, value in study.speeds._asdict().items()},
+        **{f"{name}_km_h": value for name, value in asdict(study.speeds).items()},
         "directions": study.directions,
         "one_way": study.one_way,
         "criteria": criteria.records(),
@@ -421,7 +367,7 @@ def write(folder: Path, study: SpeedStudy) -> list[Path]:
         "runs": runs.records(),
     }
     drawn = partial(draw, study)
-    return write_files(folder, {TABLE: criteria, RUNS: runs, RECORD: record, PICTURE: drawn})
+    return {TABLE: criteria, RUNS: runs, RECORD: record, PICTURE: drawn}
 
 
 @figures.own_style()

@@ -18,16 +18,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
-from math import floor, inf
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
-from catenary.base.options import option
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.asked import Distances
 from catenary.cases.studies.sweep.jobs import Ended, statistics_of
 from catenary.cases.studies.sweep.output import failed_criteria
 from catenary.cases.studies.sweep.together import Marching
@@ -35,18 +33,16 @@ from catenary.cases.studies.sweep.variants import Variant, text_of
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import (
     Column,
+    Content,
     Row,
     StudyTable,
     remark_lines,
-    write_files,
 )
 
 if TYPE_CHECKING:
     from catenary.cases.studies.waves.theory import WaveTheory
 
 TABLE, RECORD, PICTURE = "separation.csv", "separation.json", "separation.png"
-# Most distances of a study, the bounds of a distance, and the least step between two [m].
-MOST, _LEAST, _FARTHEST, _CLOSEST = 2000, 1.0, 1000.0, 1e-3
 DISTANCE, PLACES = "separation_m", ("leading", "trailing")
 _UPLIFT = "max_uplift_mm"
 _OF_BOTH = (
@@ -59,39 +55,6 @@ _LEAST_FOR_PERIOD = 12  # distances from which a period can be read
 # Curves without a period, of which so many may be explained as well.
 _RANDOM, _AS_WELL = 99, 4
 _MOST_ALIKE = 0.995  # correlation of neighbours, near which a curve has hardly any variance
-
-
-class Distances(NamedTuple):
-    """Distances that are marched: ``nearest``, ``farthest`` and ``step`` between them, all [m]."""
-
-    nearest: float = 31.0
-    farthest: float = 400.0
-    step: float = 1.0
-
-    def values(self) -> list[float]:
-        """The distances, ascending.
-
-        Raises
-        ------
-        InputError
-            If the range is none, or the division too fine.
-        """
-        if not _LEAST <= self.nearest < self.farthest <= _FARTHEST:
-            raise InputError(
-                f"{option('--from', 'nearest')} {self.nearest:g} {option('--to', 'farthest')} "
-                f"{self.farthest:g} is no range of distances: give two ascending ones from "
-                f"{_LEAST:g} to {_FARTHEST:g} m"
-            )
-        step = option("--step", "step")
-        if not _CLOSEST <= self.step < inf:
-            raise InputError(
-                f"{step} {self.step:g} is not possible: it is finite and at least {_CLOSEST:g} m"
-            )
-        length = self.farthest - self.nearest
-        if length / self.step > MOST:
-            raise InputError(f"{step} {self.step:g} makes more than {MOST} distances")
-        count = floor(length / self.step + 1e-9) + 1
-        return [round(self.nearest + number * self.step, 4) for number in range(count)]
 
 
 @dataclass(frozen=True)
@@ -139,13 +102,12 @@ class SeparationStudy:
         return StudyTable([*columns, Column("remarks")], self.rows)
 
 
-def find_separations(marching: Marching, scene: Scene, distances: Distances) -> SeparationStudy:
+def find_separations(marching: Marching, distances: Distances) -> SeparationStudy:
     """March one pantograph alone and two at each distance. Collective.
 
     Parameters
     ----------
-    marching : of the case
-    scene : the case, checked; all pantographs are of the kind of its first
+    marching : of the case; all pantographs are of the kind of its first
     distances : between the two pantographs
 
     Raises
@@ -155,7 +117,7 @@ def find_separations(marching: Marching, scene: Scene, distances: Distances) -> 
     Interrupted
         If a signal came.
     """
-    values = (None, *distances.values())
+    scene, values = marching.scene, (None, *distances.values())
     ended = marching.of([variant_of(scene, value) for value in values])
     rows = [_row(*both) for both in zip(values, ended, strict=True)]
     kind = scene.train.pantographs[0].name
@@ -367,9 +329,8 @@ def _stretches(rows: Sequence[Row], name: str) -> str:
     return ", ".join(f"{run[0]:g}-{run[-1]:g}" if len(run) > 1 else f"{run[0]:g}" for run in runs)
 
 
-def write(folder: Path, study: SeparationStudy, period: Period) -> list[Path]:
-    """Write table, record and picture of a study and its ``period``; returns the files. Not
-    collective."""
+def files_of(study: SeparationStudy, period: Period) -> dict[str, Content]:
+    """Table, record and picture of a study and its ``period``. Not collective."""
     table, ranked = study.table(), study.by_deviation
     record = {
         "case": study.case,
@@ -384,7 +345,7 @@ def write(folder: Path, study: SeparationStudy, period: Period) -> list[Path]:
         "rows": table.records(),
     }
     drawn = partial(draw, study, period)
-    return write_files(folder, {TABLE: table, RECORD: record, PICTURE: drawn})
+    return {TABLE: table, RECORD: record, PICTURE: drawn}
 
 
 @figures.own_style()

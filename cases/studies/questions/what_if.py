@@ -35,7 +35,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures, overlays
 from catenary.postproc.report.sections.section import Picture, Section, Text
-from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
+from catenary.postproc.report.study_table import Column, Content, StudyTable, remark_lines
 
 AS_IT_IS, CHANGED, DIFFERENCE = "as_it_is", "changed", "difference"
 WORDS = {AS_IT_IS: "as it is", CHANGED: "changed"}
@@ -245,20 +245,19 @@ def as_text(found: Differences) -> str:
     return "\n".join([*lines, *remark_lines(named)])
 
 
-def write(folder: Path, found: Differences) -> list[Path]:
-    """Write the page, its tables and pictures; returns the files. Not collective."""
+def files_of(folder: Path, found: Differences) -> dict[str, Content]:
+    """The page, its tables and pictures, of runs in a folder. Not collective."""
     pictures: dict[str, bytes] = {}
     with Results(folder / AS_IT_IS) as a, Results(folder / CHANGED) as b:
         for name, draw in ((_FORCE, draw_forces), (_UPLIFT, draw_uplift)):
             pictures |= figures.painted(name, partial(draw, a, b))
     title = f"{found.case}: what if {', '.join(found.changes)}"
     lead = "Differences are those of the changed run minus those of the case as it is."
-    return write_files(
-        folder,
-        {f"{name}.png": data for name, data in pictures.items()}
-        | {f"{name}.csv": table for name, table in found.tables.items()}
-        | {PAGE: page(title, lead, _sections(found), pictures)},
-    )
+    return {
+        **{f"{name}.png": data for name, data in pictures.items()},
+        **{f"{name}.csv": table for name, table in found.tables.items()},
+        PAGE: page(title, lead, _sections(found), pictures),
+    }
 
 
 def _sections(found: Differences) -> Iterator[Section]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from catenary.cases.studies.reference.judgement import (
@@ -22,7 +21,7 @@ from catenary.postproc.evaluate.wording import UNCOMPARED_SAYS
 from catenary.postproc.report.page import page
 from catenary.postproc.report.pictures import figures, overlays
 from catenary.postproc.report.sections.section import Picture, Section, Text
-from catenary.postproc.report.study_table import Content, StudyTable, write_files
+from catenary.postproc.report.study_table import Content, StudyTable
 
 JUDGED, VALIDATION = "judged", "validation"
 _BORROWED = (
@@ -44,8 +43,8 @@ def judged_text(others: Sequence[Others]) -> str:
     return "\n".join(lines)
 
 
-def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
-    """Write page, CSV, JSON and pictures of a judgement; returns the files. Not collective."""
+def judged_files(others: Sequence[Others]) -> dict[str, Content]:
+    """Page, CSV, JSON and pictures of a judgement. Not collective."""
     rows = rows_of(others)
     table = table_of(rows, "Figures")
     pictures: dict[str, bytes] = {}
@@ -68,7 +67,7 @@ def write_judged(folder: Path, others: Sequence[Others]) -> list[Path]:
     content[f"{JUDGED}.csv"] = table
     content[f"{JUDGED}.json"] = {"figures": table.records(), "summary": counts(rows)}
     content[f"{JUDGED}.html"] = page("Beside the reference solutions", lead, sections, pictures)
-    return write_files(folder, content)
+    return content
 
 
 def validation_text(found: Validation) -> str:
@@ -99,8 +98,8 @@ def _closing(found: Validation) -> list[str]:
     ]
 
 
-def write_validation(folder: Path, found: Validation) -> list[Path]:
-    """Write the statement as page, Markdown, CSV and JSON; returns the files. Not collective."""
+def validation_files(found: Validation) -> dict[str, Content]:
+    """The statement as page, Markdown, CSV and JSON. Not collective."""
     table, closing = table_of(found.rows, ""), _closing(found)
     statement = {
         "installation": found.installation,
@@ -109,15 +108,12 @@ def write_validation(folder: Path, found: Validation) -> list[Path]:
         "closing": closing,
     }
     html = page("Validation by EN 50318", " ".join(closing), _sections(found), {})
-    return write_files(
-        folder,
-        {
-            f"{VALIDATION}.csv": table,
-            f"{VALIDATION}.json": statement,
-            f"{VALIDATION}.md": _markdown(found),
-            f"{VALIDATION}.html": html,
-        },
-    )
+    return {
+        f"{VALIDATION}.csv": table,
+        f"{VALIDATION}.json": statement,
+        f"{VALIDATION}.md": _markdown(found),
+        f"{VALIDATION}.html": html,
+    }
 
 
 def _shown(step: Step) -> list[dict[str, Any]]:

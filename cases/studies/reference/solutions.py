@@ -19,19 +19,18 @@ from catenary.cases.studies.reference.configurations import Configuration, confi
 from catenary.cases.studies.reference.convergence import FINEST, run_name, statistics
 from catenary.cases.studies.sweep.jobs import Ended, all_done
 from catenary.postproc.files.csv_text import csv_text
-from catenary.postproc.report.study_table import Content, write_files
+from catenary.postproc.report.study_table import Content
 
 DATA = Path(__file__).parent / "data"
 STATISTICS, METADATA = "statistics.csv", "metadata.json"
 PLACE = "place_m"
 
 
-def write(folder: Path, chosen: Sequence[Configuration], ended: Sequence[Ended]) -> list[Path]:
-    """Write the solutions of some configurations; returns the files. Not collective.
+def files_of(chosen: Sequence[Configuration], ended: Sequence[Ended]) -> dict[str, Content]:
+    """The solutions of some configurations. Not collective.
 
     Parameters
     ----------
-    folder : for the files
     chosen : configurations
     ended : all runs of ``convergence.jobs_of``
 
@@ -45,7 +44,7 @@ def write(folder: Path, chosen: Sequence[Configuration], ended: Sequence[Ended])
     content: dict[str, Content] = {STATISTICS: rows, METADATA: _metadata(chosen)}
     for one in chosen:
         content[f"{one.name}.csv"] = _forces(one, runs[run_name(one, FINEST)])
-    return write_files(folder, content)
+    return content
 
 
 def _metadata(chosen: Sequence[Configuration]) -> dict[str, Any]:

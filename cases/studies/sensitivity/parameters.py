@@ -243,7 +243,7 @@ class ChangedScenes:
 
     def _instead(self, parts: Sequence[str]) -> str:
         """The pantographs or entries that a wrong key could name, for the end of a sentence."""
-        if parts[0] == "pantographs" and parts[1] not in self._raw["pantographs"]:
+        if parts[0] == "pantographs" and parts[1:2] not in [[n] for n in self._raw["pantographs"]]:
             return f"; its pantographs are {', '.join(self._raw['pantographs'])}"
         holder = value_at(self._raw, ".".join(parts[:-1]))
         if isinstance(holder, list):

@@ -60,7 +60,8 @@ def check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> No
     """Raise InputError if one of ``names`` is none of ``known``, ``what`` being one of these."""
     for name in names:
         if name not in known:
-            raise InputError(f"{shown(name)[1:-1]} is no {what}; {meant(name, list(known))}")
+            told = shown(name)[1:-1] or shown(name)
+            raise InputError(f"{told} is no {what}; {meant(name, list(known))}")
 
 
 def statistics_of(summary: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from catenary.postproc.report.study_table import (
     StudyTable,
     cell,
     remark_lines,
-    write_files,
 )
 
 TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
@@ -122,23 +120,21 @@ def remarks_of(ended: Sequence[Ended]) -> list[str]:
     return remark_lines((one.variant.name, one.remarks) for one in ended)
 
 
-def write(
-    out_dir: Path,
+def files_of(
     case: str,
     ended: Sequence[Ended],
     plotted: Sequence[str] | None,
     histogram: bool = False,
     scene: Mapping[str, Any] | None = None,
-) -> list[Path]:
-    """Write table, record and picture of a sweep; returns the files. Not collective.
+) -> dict[str, Content]:
+    """Table, record and picture of a sweep. Not collective.
 
     Parameters
     ----------
-    out_dir : folder of the sweep
     case : name of the case
     ended : how each variant ended
-    plotted : statistics in the picture, None for no picture; fewer than two variants that are done
-        have none
+    plotted : statistics in the picture, the usual ones if there are none, None for no picture;
+        fewer than two variants that are done have none
     histogram : whether histograms of the contact forces are written too
     scene : tables of the case, from which variants differ; they go into the record
     """
@@ -155,10 +151,10 @@ def write(
     }
     content = table_files(record, table)
     if plotted is not None and sum(one.done for one in ended) > 1:
-        content[PICTURE] = partial(draw, table.rows, varied_keys(ended), plotted)
+        content[PICTURE] = partial(draw, table.rows, varied_keys(ended), plotted or PLOTTED)
     if histogram:
         content |= force_histograms.files(ended)
-    return write_files(out_dir, content)
+    return content
 
 
 def table_files(record: Mapping[str, Any], table: StudyTable) -> dict[str, Content]:

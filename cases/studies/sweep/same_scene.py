@@ -21,7 +21,7 @@ def other_value(
     one, two : tables of the scenes, as records of sweeps have them
     varied : keys that variants set, so that it does not matter what the scenes have there
     """
-    for key, here, there in _differences(one, two):
+    for key, here, there in differences(one, two):
         sets = any(f"{key}.".startswith(f"{own}.") for own in varied)
         # Files may stand in other folders of other machines.
         elsewhere = key.endswith("file") and Path(str(here)).name == Path(str(there)).name
@@ -30,7 +30,7 @@ def other_value(
     return None
 
 
-def _differences(one: Any, two: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+def differences(one: Any, two: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Keys of tables, and of lists of one length, with the values in which they differ."""
     pairs: list[tuple[str, Any, Any]]
     if isinstance(one, Mapping) and isinstance(two, Mapping):
@@ -42,4 +42,4 @@ def _differences(one: Any, two: Any, key: str = "") -> Iterator[tuple[str, Any, 
             yield key, one, two
         return
     for name, a, b in pairs:
-        yield from _differences(a, b, f"{key}.{name}" if key else name)
+        yield from differences(a, b, f"{key}.{name}" if key else name)

@@ -1,28 +1,24 @@
-"""A sweep from its variants to its table."""
+"""A sweep whose variants leave whole runs, and what a folder of one already holds."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.errors import InputError
-from catenary.base.options import option
 from catenary.cases.result_folder.output_folder import (
     another_folder,
     force_option,
-    refuse_earlier,
     refuse_impossible,
 )
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.sweep.jobs import (
-    HISTORIES,
     Ended,
     Job,
     RunOptions,
-    check_names,
     in_order,
     jobs_and_refused,
 )
@@ -32,7 +28,6 @@ from catenary.cases.studies.sweep.variants import Variant
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import Part
-    from catenary.cases.studies.sweep.together import Ensemble
 
 
 class WholeRuns(NamedTuple):
@@ -70,54 +65,6 @@ class WholeRuns(NamedTuple):
         return in_order(self.variants, run_jobs(self.jobs, out, comm, options), self.refused)
 
 
-Sweep: TypeAlias = "WholeRuns | Ensemble"
-"""Whole runs of variants, or an ensemble that keeps statistics alone."""
-
-
-def sweep_of(
-    draft: Draft,
-    variants: Sequence[Variant],
-    out: Path,
-    *,
-    full_report: bool = False,
-    only_statistics: bool = False,
-    histories: Sequence[str] = (),
-    force: bool = False,
-) -> Sweep:
-    """A sweep of a case into a folder, all scenes checked. Not collective.
-
-    Parameters
-    ----------
-    draft : of the case
-    variants : of the sweep
-    out : folder of the sweep
-    full_report : whether each whole run gets a report
-    only_statistics : whether it is an ensemble: there is no run of a variant on the disk, but for
-        ``histories``, and scenes are checked when it is their turn
-    histories : channels that an ensemble keeps over time
-    force : whether a sweep with other variants there is replaced
-
-    Raises
-    ------
-    InputError
-        If one of ``histories`` is none, or whole runs are kept, which have them; as
-        ``whole_runs_of``.
-    """
-    check_names(histories, HISTORIES, "history")
-    if not only_statistics:
-        if histories:
-            raise InputError(
-                f"{option('--histories', 'histories')} goes with "
-                f"{option('--only-statistics', 'only_statistics')}: whole runs keep all in run.h5"
-            )
-        return whole_runs_of(draft, variants, out, full_report=full_report, force=force)
-    from catenary.cases.studies.sweep.together import ensemble_of
-
-    ensemble = ensemble_of(draft, variants, histories)
-    refuse_other_sweep(out, variants, force, draft)
-    return ensemble
-
-
 def whole_runs_of(
     draft: Draft,
     variants: Sequence[Variant],
@@ -138,60 +85,6 @@ def whole_runs_of(
     runs = WholeRuns(draft, variants, *jobs_and_refused(draft, variants, full_report))
     refuse_other_sweep(out, variants, force)
     return runs
-
-
-def run_sweep(
-    sweep: Sweep,
-    out: Path,
-    comm: Any,
-    options: RunOptions,
-    command: str,
-    plotted: Sequence[str] | None,
-    histogram: bool = False,
-) -> tuple[list[Ended], list[Path]]:
-    """Run what is not done yet, and write table and picture. Collective.
-
-    Parameters
-    ----------
-    command : work of this process in words, for others that want the folder
-    plotted : statistics that are drawn; the usual ones if there are none, no picture of None
-    histogram : whether histograms of the contact forces are written too
-
-    Returns
-    -------
-    How all variants ended, in their order, and the files.
-    """
-    from catenary.base.parallel import on_root
-    from catenary.cases.result_folder.folder_lock import held
-    from catenary.cases.studies.sweep import output
-
-    name, show, scene = sweep.first.case.name, plotted, sweep.draft.table()
-    if show is not None:
-        show = show or output.PLOTTED
-    with held(out, comm, command):
-        on_root(comm, lambda: refuse_earlier(out, options.force))
-        ended = sweep.run(out, comm, options)
-        files = on_root(
-            comm, lambda: output.write(out, name, ended, show, histogram, scene), takes_long=True
-        )
-    if not isinstance(sweep, WholeRuns) and sweep.histories:
-        files += [path for path in (out / "histories.h5",) if path.is_file()]
-    return ended, files
-
-
-def run_part(sweep: Sweep, part: Part, out: Path, comm: Any, options: RunOptions) -> list[Ended]:
-    """Run a part of a sweep, as a task of a job array; returns how its variants ended. Collective.
-
-    The part writes a table to a folder of its own, for ``catenary merge``. If parts share ``out``,
-    the sweep run there after all of them writes the table of all variants.
-    """
-    from catenary.base.parallel import on_root
-    from catenary.cases.studies.sweep import output
-
-    ended = sweep.run(out, comm, options, part)
-    name, folder, scene = sweep.first.case.name, out / part.folder, sweep.draft.table()
-    on_root(comm, lambda: output.write(folder, name, ended, None, scene=scene), takes_long=True)
-    return ended
 
 
 def refuse_other_sweep(

@@ -189,10 +189,13 @@ def pieces_of_work(variants: Sequence[Variant], size: int) -> list[list[Variant]
 
 @dataclass
 class Marching:
-    """Marches variants of a case again and again; ``out``, ``comm`` and ``options`` are those of
-    ``Ensemble.run``."""
+    """Marches variants of a case again and again.
+
+    ``scene`` is the case as it is; ``out``, ``comm`` and ``options`` are those of ``Ensemble.run``.
+    """
 
     draft: Draft
+    scene: Scene
     out: Path | None
     comm: Any
     options: RunOptions

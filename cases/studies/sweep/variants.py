@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.errors import InputError
+from catenary.base.options import option
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import steers
 from catenary.cases.scene.input.toml_input import parse_assignment, read_toml
@@ -77,10 +78,10 @@ def parse_vary(text: str) -> VariedKey:
     return varied_key(key, values)
 
 
-def whole_numbers(text: str, option: str, least: int, most: int, example: str) -> list[int]:
+def whole_numbers(text: str, flag: str, least: int, most: int, example: str) -> list[int]:
     """Whole numbers of a ``text`` of the form ``a,b,...``, from ``least`` to ``most``, ascending.
 
-    ``option`` is the name of the command's option, ``example`` a right text, both for the sentence.
+    ``flag`` is the name of the command's option, ``example`` a right text, both for the sentence.
 
     Raises
     ------
@@ -94,35 +95,36 @@ def whole_numbers(text: str, option: str, least: int, most: int, example: str) -
     within = bool(values) and least <= values[0] and values[-1] <= most
     if not within or len(set(values)) < len(values):
         raise InputError(
-            f"{option} {shown(text)[1:-1]} must be whole numbers from {least} to {most}, each "
+            f"{flag} {shown(text)[1:-1]} must be whole numbers from {least} to {most}, each "
             f"once, as a,b,..., e.g. {example}"
         )
     return values
 
 
-def varied_key(key: str, values: tuple[str, ...], option: str = "--vary") -> VariedKey:
-    """A key and the texts of its values, at least one; ``option`` names in an error what gave them.
+def varied_key(key: str, values: tuple[str, ...]) -> VariedKey:
+    """A key and the texts of its values, at least one.
 
     Raises
     ------
     InputError
         If a value is named twice, or if PETSc takes the key at its start.
     """
+    vary = option("--vary", "vary")
     if key.split(".")[0] == "petsc":
         raise InputError(
-            f"{option} {shown(key)[1:-1]} is not possible: PETSc takes its options once, when the "
+            f"{vary} {shown(key)[1:-1]} is not possible: PETSc takes its options once, when the "
             "program starts"
         )
     for text in (key, *values):
         if any(steers(letter) for letter in text):
-            raise InputError(f"{option} {shown(text)} holds a control character")
+            raise InputError(f"{vary} {shown(text)} holds a control character")
     first: dict[str | float, str] = {}
     for value in values:
         number = _number_of(value)
         if number in first:
             earlier, again = shown(first[number])[1:-1], shown(value)[1:-1]
             how = "twice" if again == earlier else f"after {earlier}, which is the same"
-            raise InputError(f"{option} {shown(key)[1:-1]} names {again} {how}")
+            raise InputError(f"{vary} {shown(key)[1:-1]} names {again} {how}")
         first[number] = value
     return VariedKey(key, values)
 
@@ -238,21 +240,21 @@ def product(
     InputError
         If a key is varied twice, or a later one sets it again, or there are too many combinations.
     """
-    keys = [each.key for each in varied]
+    keys, vary = [each.key for each in varied], option("--vary", "vary")
     for key in keys:
         if keys.count(key) > 1:
-            raise InputError(f"--vary {key} is given twice; name all its values in one --vary")
+            raise InputError(f"{vary} {key} is given twice; name all its values in one {vary}")
     for earlier, later in itertools.combinations(keys, 2):
         if sets_again(later, earlier):
             raise InputError(
-                f"--vary {later} sets {earlier} again, so that the values of the latter would be "
+                f"{vary} {later} sets {earlier} again, so that the values of the latter would be "
                 f"lost; name {later} first"
             )
     for (name, assignments), key in itertools.product(named.items(), keys):
         for given in (text.partition("=")[0].strip() for text in assignments):
             if sets_again(key, given):
                 raise InputError(
-                    f"--vary {key} sets the {given} of variant {shown(name)[1:-1]} again, so that "
+                    f"{vary} {key} sets the {given} of variant {shown(name)[1:-1]} again, so that "
                     "the latter would be lost; leave one of them out"
                 )
     count = max(len(named), 1)

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from catenary.cases.studies.tolerance.pictures import draw_shares, draw_values
 from catenary.cases.studies.tolerance.study import ALL, EACH, Plan, Tolerance, at_least
-from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
+from catenary.postproc.report.study_table import Column, Content, StudyTable
 
 TABLE, RECORD, PAGE = "tolerance.csv", "tolerance.json", "tolerance.md"
 SHARES, VALUES = "tolerance_shares.png", "tolerance_values.png"
 
 
-def write(out_dir: Path, plan: Plan, found: Sequence[Tolerance]) -> list[Path]:
-    """Write all tables and pictures of a study; returns the files. Not collective."""
+def files_of(plan: Plan, found: Sequence[Tolerance]) -> dict[str, Content]:
+    """All tables and pictures of a study. Not collective."""
     record = {
         "case": plan.name,
         "task": plan.task.model_dump(exclude_none=True),
@@ -26,14 +25,13 @@ def write(out_dir: Path, plan: Plan, found: Sequence[Tolerance]) -> list[Path]:
             _fields(one) | {"levels": one.samples.records() if one.samples else []} for one in found
         ],
     }
-    content: dict[str, Content] = {
+    return {
         TABLE: table_of(found),
         RECORD: record,
         PAGE: markdown(plan, found),
         SHARES: partial(draw_shares, plan, found),
         VALUES: partial(draw_values, plan, found),
     }
-    return write_files(out_dir, content)
 
 
 def _fields(one: Tolerance) -> dict[str, Any]:

@@ -241,33 +241,28 @@ _MOST_REMARKS = 5  # on a terminal; all are in the file
 _WHAT_FAILS = ("Share of the runs in which", "Probability that")  # by whether these are samples
 
 
-def write(
-    out: Path, table: RunTable, found: Uncertainty, plotted: Sequence[str] = ()
-) -> list[Path]:
-    """Write an evaluation, its pictures and the sampling; returns the files. Not collective.
+def files_of(
+    table: RunTable, found: Uncertainty, plotted: Sequence[str] = ()
+) -> dict[str, Content]:
+    """An evaluation of a table, its pictures and the sampling. Not collective.
 
-    Parameters
-    ----------
-    out : folder
-    table : the runs
-    found : their evaluation
-    plotted : statistics that are drawn; the usual ones if there are none
+    ``plotted`` are statistics that are drawn; the usual ones if there are none.
     """
     content: dict[str, Content] = {RECORD: vars(found)}
     if table.sampling is not None:
         content |= sampling_file(table.sampling)
     for name, draw in PICTURES.items():
         content[name] = partial(draw, table, plotted)
-    return write_files(out, content)
+    return content
 
 
 def write_evaluated(
     out: Path, rows: Sequence[Row], sampling: SamplingTable, plotted: Sequence[str] = ()
 ) -> tuple[Uncertainty, list[Path]]:
-    """Evaluate rows of a sweep of samples, and write that as ``write``. Not collective."""
+    """Evaluate rows of a sweep of samples, and write ``files_of`` that. Not collective."""
     table = run_table(rows, sampling)
     found = evaluate(table)
-    return found, write(out, table, found, plotted)
+    return found, write_files(out, files_of(table, found, plotted))
 
 
 def as_text(found: Uncertainty) -> str:

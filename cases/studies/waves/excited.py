@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.base.options import flag_of
+from catenary.cases.studies.asked import Excited
 from catenary.cases.studies.waves.seen import NodeMotion
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.slowest_wave import slowest_wave_of
@@ -39,36 +40,17 @@ IMPULSE = 10.0
 _ASIDE = LumpedData((8.0,), (0.0,), (0.0,))
 
 
-class Settings(NamedTuple):
-    """Settings of an excitation beside its kind; None for that of the scene or of the kind.
-
-    Attributes
-    ----------
-    force : of a moving force or a pulse [N]
-    frequency : of a moving force [Hz]
-    at : place of a blow [m]
-    duration : of a blow [s]
-    impulse : of a hammer [N s]
-    """
-
-    force: float | None = None
-    frequency: float | None = None
-    at: float | None = None
-    duration: float | None = None
-    impulse: float | None = None
-
-
-# Options of the command line for these, and kinds that take them.
-_OPTIONS = {
-    "force": ("--force-N", (FORCE, PULSE)),
-    "frequency": ("--frequency-Hz", (FORCE,)),
-    "at": ("--at-m", (PULSE, HAMMER)),
-    "duration": ("--duration-s", (PULSE, HAMMER)),
-    "impulse": ("--impulse-Ns", (HAMMER,)),
+# Kinds that take a setting.
+_KINDS = {
+    "force": (FORCE, PULSE),
+    "frequency": (FORCE,),
+    "at": (PULSE, HAMMER),
+    "duration": (PULSE, HAMMER),
+    "impulse": (HAMMER,),
 }
 
 
-def excitation_of(kind: str, settings: Settings, problem: Problem, dt: float) -> Excitation:
+def excitation_of(kind: str, settings: Excited, problem: Problem, dt: float) -> Excitation:
     """The excitation of a kind on the line of a problem.
 
     Parameters
@@ -94,10 +76,10 @@ def excitation_of(kind: str, settings: Settings, problem: Problem, dt: float) ->
     return _blow(kind, settings, problem, dt)
 
 
-def _refuse_settings(kind: str, settings: Settings) -> None:
+def _refuse_settings(kind: str, settings: Excited) -> None:
     """Refuse settings that are none of the kind's, or without effect."""
-    for name, (option, kinds) in _OPTIONS.items():
-        value = getattr(settings, name)
+    for name, kinds in _KINDS.items():
+        value, option = getattr(settings, name), flag_of(Excited, name)
         if value is None:
             continue
         if kind not in kinds:
@@ -108,13 +90,13 @@ def _refuse_settings(kind: str, settings: Settings) -> None:
             raise InputError(f"{option} is 0, which excites nothing; it may be above or below")
 
 
-def _force_of(settings: Settings, problem: Problem) -> float:
+def _force_of(settings: Excited, problem: Problem) -> float:
     """The force of an excitation, that of the first pantograph if none is set [N]."""
     static = problem.train.placements[0].static_force
     return static if settings.force is None else settings.force
 
 
-def _moving_force(settings: Settings, problem: Problem, dt: float) -> MovingForce:
+def _moving_force(settings: Excited, problem: Problem, dt: float) -> MovingForce:
     """A force that moves with the train."""
     train = problem.train
     frequency = settings.frequency or 0.0
@@ -129,7 +111,7 @@ def _moving_force(settings: Settings, problem: Problem, dt: float) -> MovingForc
     return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
 
 
-def _blow(kind: str, settings: Settings, problem: Problem, dt: float) -> Blow:
+def _blow(kind: str, settings: Excited, problem: Problem, dt: float) -> Blow:
     """A pulse, or the blow of a hammer."""
     if problem.window.mode == BOUNDED:
         raise InputError(

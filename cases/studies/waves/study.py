@@ -17,9 +17,9 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import recorded_scene
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
+from catenary.cases.studies.asked import Excited
 from catenary.cases.studies.waves import obstacles, pictures
 from catenary.cases.studies.waves.excited import (
-    Settings,
     Watch,
     excitation_of,
     without_train,
@@ -106,7 +106,7 @@ def study_waves(folder: Path) -> tuple[str, list[Path]]:
 
 
 def study_excited(
-    scene: Scene, kind: str, settings: Settings, folder: Path, force: bool
+    scene: Scene, kind: str, settings: Excited, folder: Path, force: bool
 ) -> tuple[str, list[Path]]:
     """Run a line without its train under an excitation, and write the waves that are seen; a text
     for terminals, and the files. Serial.

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from catenary.cases.studies.ensemble import Keeper
 from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.record.run_watch import RunWatch
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, StudyTable, remark_lines, write_files
+from catenary.postproc.report.study_table import Column, Content, StudyTable, remark_lines
 from catenary.solver.problem.problem import WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
@@ -138,9 +137,9 @@ def table_of(curves: Sequence[Curve]) -> StudyTable:
     return StudyTable(columns, rows)
 
 
-def write(folder: Path, curves: Sequence[Curve]) -> list[Path]:
-    """Write table and picture; returns the files. Not collective."""
-    return write_files(folder, {TABLE: table_of(curves), PICTURE: lambda: draw(curves)})
+def files_of(curves: Sequence[Curve]) -> dict[str, Content]:
+    """Table and picture. Not collective."""
+    return {TABLE: table_of(curves), PICTURE: lambda: draw(curves)}
 
 
 @figures.own_style()

@@ -297,13 +297,18 @@ def painted(name: str, draw: Callable[[], Figure | None]) -> dict[str, bytes]:
                 from catenary.postproc.report.pictures.interactive import as_json
 
                 return {name: as_json(figure).encode()}
-            return {name: svg(figure) if name.endswith(".svg") else png(figure)}
+            return {name: file_of(figure, name)}
     except CatenaryError:
         raise
     except Exception as error:
         reason = str(error) or type(error).__name__
         logger.warning("%s was not drawn (%s); all figures are in the other files", name, reason)
         return {}
+
+
+def file_of(figure: Figure, name: str) -> bytes:
+    """``figure`` as the bytes of a file, SVG or PNG by the suffix of its ``name``."""
+    return svg(figure) if name.endswith(".svg") else png(figure)
 
 
 @own_style()

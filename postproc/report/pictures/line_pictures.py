@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib
@@ -294,16 +293,8 @@ _ALLOWED = 10.0
 
 
 @own_style()
-def draw_temperatures(rests: Sequence[LineAtTemperature], path: Path) -> None:
-    """Write a picture of a line at several temperatures. Not collective.
-
-    Parameters
-    ----------
-    rests : sequence of LineAtTemperature
-        Line at rest at each temperature.
-    path : Path
-        PNG or SVG file, by its suffix.
-    """
+def draw_temperatures(rests: Sequence[LineAtTemperature]) -> Figure:
+    """A picture of a line at rest at each of several temperatures. Not collective."""
     found = [rest for rest in rests if not rest.why_not]
     names = [wire.name for wire in found[0].wires if wire.ends] if found else []
     figure = new_figure(2.6 * (len(names) + 1))
@@ -336,4 +327,4 @@ def draw_temperatures(rests: Sequence[LineAtTemperature], path: Path) -> None:
     tidy(ends, "temperature above the installation [K]", "end outwards [mm]", "ends of the wires")
     if names:
         ends.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
-    figure.savefig(path)
+    return figure

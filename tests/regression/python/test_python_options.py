@@ -30,6 +30,15 @@ REFUSALS: dict[str, tuple[Refused, list[str], str, str]] = {
         "name another folder with out, or give force=True to replace them",
         "name another folder with -o, or give --force to replace them",
     ),
+    "values that another key sets again": (
+        lambda scene, done: catenary.sweep(
+            scene, {"contact.stiffness_N_per_m": [1e4], "contact": [{"stiffness_N_per_m": 2e4}]}
+        ),
+        ["sweep", CASE, "-o", "NONE", "--vary", "contact.stiffness_N_per_m=1e4", "--vary"]
+        + ["contact={stiffness_N_per_m=2e4}"],
+        "vary contact sets contact.stiffness_N_per_m again",
+        "--vary contact sets contact.stiffness_N_per_m again",
+    ),
     "restart": (
         lambda scene, done: catenary.restart(done),
         ["restart", "DONE"],

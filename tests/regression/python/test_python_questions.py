@@ -80,7 +80,7 @@ def test_a_search_that_was_stopped_goes_on_in_its_folder(
     from catenary.cases.studies.ensemble import Marches
     from catenary.cases.studies.questions import separation
 
-    def full(*of: Any) -> list[Path]:
+    def full(*of: Any) -> None:
         raise catenary.RunBroken("the disk is full")
 
     marched: list[int] = []
@@ -92,7 +92,7 @@ def test_a_search_that_was_stopped_goes_on_in_its_folder(
 
     monkeypatch.setattr(Marches, "of", counted)
     with monkeypatch.context() as broken, pytest.raises(catenary.RunBroken):
-        broken.setattr(separation, "write", full)
+        broken.setattr(separation, "files_of", full)
         ask(scene, *span, tmp_path, **options)
     assert sum(marched) == 3  # one alone and two pairs
     table = ask(scene, *span, tmp_path, **options)
