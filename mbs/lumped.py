@@ -142,6 +142,7 @@ class LumpedPantograph(SteppedHead):
             now["part"] = self._part(time)
         if self._laws.laws:
             now["base"], now["base_velocity"] = self._base_motion(time)
+            now["roof"], now["roof_velocity"] = lifted(self._base, time)
         self.stepped.step(self.row)
         return self.head
 
@@ -165,6 +166,8 @@ class LumpedPantograph(SteppedHead):
         if self._laws.laws and self._base is not None:
             motions = np.array([self._base_motion(time) for time in times.tolist()])
             rows["base"], rows["base_velocity"] = motions.T
+            roofs = np.array([lifted(self._base, time) for time in times.tolist()])
+            rows["roof"], rows["roof_velocity"] = roofs.T
         if self._control is not None:
             rows["part"] = parts_of(self._part, times)
         self._fill_lateral(times, drives)
@@ -216,5 +219,6 @@ class LumpedPantograph(SteppedHead):
             force[self._carrier] += on_frame
             force += on_head * self._push
         if self._laws.laws:
-            force += self._laws.pull(self.position, self.velocity, self._base_motion(time))
+            base, roof = self._base_motion(time), lifted(self._base, time)
+            force += self._laws.pull(self.position, self.velocity, base, roof)
         return np.asarray(force / self._masses)
