@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.air import Uplift
-from catenary.mbs.head.laws import Law
+from catenary.mbs.head.laws import Law, given_way
 from catenary.mbs.head.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
 
 # Force of the base spring over the static force that compresses the springs above it, with the head
@@ -48,6 +48,12 @@ class LumpedData:
     def compliance(self) -> float:
         """Compliance of the springs between head and last mass, the strips' included [m/N]."""
         return sum(1.0 / k for k in self.stiffnesses[:-1]) + self.strips.compression(1.0)
+
+    def given_way(self, force: float) -> tuple[float, ...]:
+        """How far springs, and laws beside them, between neighbours give way under a ``force`` at
+        rest [N]: (n - 1,) [m]."""
+        springs = enumerate(self.stiffnesses[:-1])
+        return tuple(given_way(force, stiffness, self.laws, i) for i, stiffness in springs)
 
     @property
     def tied(self) -> bool:

@@ -49,6 +49,31 @@ class Law:
         return self.forces[i] + slope * (x - self.points[i])
 
 
+def given_way(force: float, stiffness: float, laws: Sequence[Law], mass: int) -> float:
+    """How far what is between a mass and the next one gives way under a force [m].
+
+    Parameters
+    ----------
+    force : float
+        Force at rest that presses the two together [N].
+    stiffness : float
+        Of the spring between them [N/m].
+    laws : sequence of Law
+        Laws of the pantograph; those over the extension between the two act beside the spring.
+    mass : int
+        The upper one, the head being 0.
+    """
+    beside = [law for law in laws if (law.mass, law.below) == (mass, mass + 1) and not law.of_rate]
+    if not beside:
+        return force / stiffness
+    kinks = np.unique([-point for law in beside for point in law.points])
+    ways = np.concatenate([[kinks[0] - 1.0], kinks, [kinks[-1] + 1.0]])
+    pushes = [stiffness * way - sum(law.force(-way) for law in beside) for way in ways.tolist()]
+    i = min(max(int(np.searchsorted(pushes, force)) - 1, 0), len(pushes) - 2)
+    part = (force - pushes[i]) / (pushes[i + 1] - pushes[i])
+    return float(ways[i] + part * (ways[i + 1] - ways[i]))
+
+
 @dataclass(frozen=True)
 class LawsInPlace:
     """Laws on the coordinates of a pantograph that stands.
