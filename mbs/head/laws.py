@@ -48,6 +48,13 @@ class Law:
         slope = (self.forces[i + 1] - self.forces[i]) / (self.points[i + 1] - self.points[i])
         return self.forces[i] + slope * (x - self.points[i])
 
+    @property
+    def stiffness(self) -> float:
+        """Its slope where it counts from, the steeper one if it has a kink there."""
+        slopes = np.diff(self.forces) / np.diff(self.points)
+        around = [np.searchsorted(self.points, 0.0, side=side) - 1 for side in ("left", "right")]
+        return float(slopes[np.clip(around, 0, slopes.size - 1)].max())
+
 
 def given_way(force: float, stiffness: float, laws: Sequence[Law], mass: int) -> float:
     """How far what is between a mass and the next one gives way under a force [m].

@@ -228,13 +228,20 @@ def test_a_stop_stands_on_the_roof_while_a_tied_chain_is_raised_with_its_base(by
     check("largest difference [m]", np.abs(found - solved.y[:2].T).max(), 0.0, within=6e-5)
 
 
-def test_a_spring_to_the_base_written_as_a_law_is_a_part_of_the_base_spring() -> None:
-    """A linear law counts from the relaxed base spring: both are one spring, to round-off."""
-    half = Law(1, 2, False, (-1.0, 1.0), (-50.0, 50.0))
+@pytest.mark.parametrize(("whole", "part"), [(100.0, 50.0), (6000.0, 0.0)])
+def test_a_spring_to_the_base_written_as_a_law_is_a_part_of_the_base_spring(
+    whole: float, part: float
+) -> None:
+    """A linear law counts from the relaxed base spring: both are one spring, to round-off.
+
+    One that holds the chain at a height is raised with its base, by the law alone too.
+    """
+    law = Law(1, 2, False, (-1.0, 1.0), (part - whole, whole - part))
     found = []
-    for stiffness, laws in ((100.0, ()), (50.0, (half,))):
+    for stiffness, laws in ((whole, ()), (part, (law,))):
         data = LumpedData((7.2, 15.0), (4200.0, stiffness), (10.0, 90.0), laws=laws)
-        one = LumpedPantograph(data, 120.0, 5.0, Stepping(0.0, 1e-3))
+        assert data.tied == (whole > 1000.0)
+        one = LumpedPantograph(data, 120.0, 5.0, Stepping(0.2, 1e-3))
         one.place(4.95)
         found.append(march(one, 1e-3, 500, lambda time: 120.0 + 50.0 * math.sin(20.0 * time)))
     assert np.ptp(found[0][:, 1]) > 0.02
