@@ -13,6 +13,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.mbs.air import Airflow, AirForces, SteadyForces
 from catenary.mbs.control import Regulator
+from catenary.mbs.head.laws import given_way
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import Pantograph
@@ -157,7 +158,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     strips = data.strips
     if strips.number > 1:
         strips = replace(strips, pitch=head.pitch)
-    pressed = pressing / head.stiffness + strips.compression(pressing)
+    pressed = given_way(pressing, head.stiffness, data.laws, 0) + strips.compression(pressing)
     arm = nominal_height + pressed - head.offset
     return RaisingData(
         frame=reduced(data),

@@ -66,10 +66,10 @@ class LumpedPantograph(SteppedHead):
         self._damping = np.ascontiguousarray(dampers[:n, :n])
         self._base_stiffness, self._base_damping = data.stiffnesses[-1], data.dampings[-1]
         # The base spring carries nothing when the head is at its nominal height under the static
-        # force, which compresses every spring between head and last mass. So does what the air
+        # force, which compresses springs and laws between head and last mass. So does what the air
         # lifts the last mass with.
         pressing = static_force + steady_air
-        compression = sum(pressing / k for k in data.stiffnesses[:-1])
+        compression = sum(data.given_way(pressing))
         compression += data.strips.compression(pressing)
         self._base_height = nominal_height + compression
         # A base that rises with the lift starts from where the chain was placed.
@@ -142,6 +142,7 @@ class LumpedPantograph(SteppedHead):
             now["part"] = self._part(time)
         if self._laws.laws:
             now["base"], now["base_velocity"] = self._base_motion(time)
+            now["roof"], now["roof_velocity"] = lifted(self._base, time)
         self.stepped.step(self.row)
         return self.head
 
@@ -165,6 +166,8 @@ class LumpedPantograph(SteppedHead):
         if self._laws.laws and self._base is not None:
             motions = np.array([self._base_motion(time) for time in times.tolist()])
             rows["base"], rows["base_velocity"] = motions.T
+            roofs = np.array([lifted(self._base, time) for time in times.tolist()])
+            rows["roof"], rows["roof_velocity"] = roofs.T
         if self._control is not None:
             rows["part"] = parts_of(self._part, times)
         self._fill_lateral(times, drives)
@@ -178,8 +181,8 @@ class LumpedPantograph(SteppedHead):
         head = int(np.flatnonzero(self._level[: self._n - data.n_masses + 1])[-1])
         numbers = [head, *range(self._n - data.n_masses + 1, self._n)]
         rest = [nominal + data.strips.compression(static_force)]
-        for stiffness in data.stiffnesses[:-1]:
-            rest.append(rest[-1] + static_force / stiffness)
+        for way in data.given_way(static_force):
+            rest.append(rest[-1] + way)
         return in_place(data.laws, numbers, self._n, rest)
 
     def _rise(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -216,5 +219,6 @@ class LumpedPantograph(SteppedHead):
             force[self._carrier] += on_frame
             force += on_head * self._push
         if self._laws.laws:
-            force += self._laws.pull(self.position, self.velocity, self._base_motion(time))
+            base, roof = self._base_motion(time), lifted(self._base, time)
+            force += self._laws.pull(self.position, self.velocity, base, roof)
         return np.asarray(force / self._masses)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.air import Uplift
-from catenary.mbs.head.laws import Law
+from catenary.mbs.head.laws import Law, given_way
 from catenary.mbs.head.strips import ONE_STRIP, HeadParts, Strips, Turning, head_parts
 
 # Force of the base spring over the static force that compresses the springs above it, with the head
@@ -49,15 +49,28 @@ class LumpedData:
         """Compliance of the springs between head and last mass, the strips' included [m/N]."""
         return sum(1.0 / k for k in self.stiffnesses[:-1]) + self.strips.compression(1.0)
 
+    def given_way(self, force: float) -> tuple[float, ...]:
+        """How far springs, and laws beside them, between neighbours give way under a ``force`` at
+        rest [N]: (n - 1,) [m]."""
+        springs = enumerate(self.stiffnesses[:-1])
+        return tuple(given_way(force, stiffness, self.laws, i) for i, stiffness in springs)
+
+    @property
+    def base_stiffness(self) -> float:
+        """Stiffness between last mass and base with the head at its nominal height [N/m]."""
+        last = self.n_masses - 1
+        beside = [law for law in self.laws if law.mass == last and not (law.of_rate or law.of_roof)]
+        return self.stiffnesses[-1] + sum(law.stiffness for law in beside)
+
     @property
     def tied(self) -> bool:
         """Whether its base spring holds it at a height: it is then raised with its base."""
-        return self.stiffnesses[-1] * self.compliance > _TIED
+        return self.base_stiffness * self.compliance > _TIED
 
     @property
     def height_stiffness(self) -> float:
         """Fall of its force by the rise of its head [N/m]."""
-        base = self.stiffnesses[-1]
+        base = self.base_stiffness
         return base / (1.0 + base * self.compliance)
 
     def chain(self, values: tuple[float, ...]) -> np.ndarray:

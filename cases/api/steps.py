@@ -123,7 +123,8 @@ class Simulation:
         InputError
             If it is no number of steps.
         RunBroken
-            If the forces of a step cannot be found, or if the end had come before this call.
+            If a step cannot be taken, with what may be why, or if the end had come before this
+            call.
 
         Examples
         --------
@@ -144,7 +145,7 @@ class Simulation:
         try:
             done = self._own.step(min(steps, self.steps_left + 1))
         except RuntimeError as error:
-            raise RunBroken(f"{error} after {self.time:g} s") from error
+            raise RunBroken(f"{error} after {self.time:g} s: {self._why()}") from error
         self._ended = not done
         return done
 
@@ -359,7 +360,8 @@ class Simulation:
     def head_force(self) -> np.ndarray:
         """Force added on the head of each pantograph, (n_pantographs,) [N], upward.
 
-        As ``lift_force``, and with its errors.
+        Strips on springs of their own share it, as they do a force of the air on the head. As
+        ``lift_force``, and with its errors.
 
         Examples
         --------
@@ -447,6 +449,17 @@ class Simulation:
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.close()
+
+    def _why(self) -> str:
+        """What may have ended the steps."""
+        inputs = self._own.inputs
+        for name in inputs.dtype.names or ():
+            if not np.isfinite(inputs[name]).all():
+                return f"{name} is {inputs[name].tolist()}; it must be finite"
+        return (
+            "no contact forces fit it, a kinematic contact would have to pull, or a mechanism "
+            "would leave the heights that it can reach"
+        )
 
     def _add(self, name: str, value: Any) -> None:
         try:

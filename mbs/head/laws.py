@@ -29,6 +29,8 @@ class Law:
     of_rate : whether its points are rates
     points : extensions [m] or their rates [m/s], which grow
     forces : [N] at these, which never fall
+    of_roof : whether it holds to the roof, as a stop does: the base of a chain that is tied to it
+        rises with the lift, the roof below does not
     """
 
     mass: int
@@ -36,6 +38,7 @@ class Law:
     of_rate: bool
     points: tuple[float, ...]
     forces: tuple[float, ...]
+    of_roof: bool = False
 
     def force(self, x: float) -> float:
         """Force at ``x``, an extension [m] or a rate [m/s], that pulls together where it is
@@ -44,6 +47,38 @@ class Law:
         i = min(max(i, 0), len(self.points) - 2)
         slope = (self.forces[i + 1] - self.forces[i]) / (self.points[i + 1] - self.points[i])
         return self.forces[i] + slope * (x - self.points[i])
+
+    @property
+    def stiffness(self) -> float:
+        """Its slope where it counts from, the steeper one if it has a kink there."""
+        slopes = np.diff(self.forces) / np.diff(self.points)
+        around = [np.searchsorted(self.points, 0.0, side=side) - 1 for side in ("left", "right")]
+        return float(slopes[np.clip(around, 0, slopes.size - 1)].max())
+
+
+def given_way(force: float, stiffness: float, laws: Sequence[Law], mass: int) -> float:
+    """How far what is between a mass and the next one gives way under a force [m].
+
+    Parameters
+    ----------
+    force : float
+        Force at rest that presses the two together [N].
+    stiffness : float
+        Of the spring between them [N/m].
+    laws : sequence of Law
+        Laws of the pantograph; those over the extension between the two act beside the spring.
+    mass : int
+        The upper one, the head being 0.
+    """
+    beside = [law for law in laws if (law.mass, law.below) == (mass, mass + 1) and not law.of_rate]
+    if not beside:
+        return force / stiffness
+    kinks = np.unique([-point for law in beside for point in law.points])
+    ways = np.concatenate([[kinks[0] - 1.0], kinks, [kinks[-1] + 1.0]])
+    pushes = [stiffness * way - sum(law.force(-way) for law in beside) for way in ways.tolist()]
+    i = min(max(int(np.searchsorted(pushes, force)) - 1, 0), len(pushes) - 2)
+    part = (force - pushes[i]) / (pushes[i + 1] - pushes[i])
+    return float(ways[i] + part * (ways[i + 1] - ways[i]))
 
 
 @dataclass(frozen=True)
@@ -54,20 +89,21 @@ class LawsInPlace:
     ----------
     laws : tuple of Law
     ways : (m, n) the extension of each by each coordinate
-    by_base : (m,) by the height of the base
+    by_base, by_roof : (m,) by the heights of base and roof
     zero : (m,) the extension where each counts from [m]
     """
 
     laws: tuple[Law, ...]
     ways: np.ndarray
     by_base: np.ndarray
+    by_roof: np.ndarray
     zero: np.ndarray
 
     def arrays(self, n_contacts: int) -> native.HeadLaws:
         """Arrays of the laws for kernels, with room for the forces of so many contacts."""
         law = np.zeros(len(self.laws), dtype=native.HEAD_LAW)
         counts = np.array([len(one.points) for one in self.laws], dtype=np.int64)
-        law["by_base"], law["zero"] = self.by_base, self.zero
+        law["by_base"], law["by_roof"], law["zero"] = self.by_base, self.by_roof, self.zero
         law["of_rate"] = [one.of_rate for one in self.laws]
         law["end"] = np.cumsum(counts)
         law["begin"] = law["end"] - counts
@@ -77,7 +113,11 @@ class LawsInPlace:
         )
 
     def pull(
-        self, position: np.ndarray, velocity: np.ndarray, base: tuple[float, float]
+        self,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        base: tuple[float, float],
+        roof: tuple[float, float],
     ) -> np.ndarray:
         """Forces on the coordinates (n,), upward [N].
 
@@ -87,13 +127,13 @@ class LawsInPlace:
             Coordinates [m].
         velocity : ndarray, shape (n,)
             Their velocities [m/s].
-        base : tuple of float
-            Height [m] and velocity [m/s] of the base.
+        base, roof : tuple of float
+            Height [m] and velocity [m/s] of the base, and of the roof.
         """
         total = np.zeros(self.ways.shape[1])
         heights, rates = self.ways @ position, self.ways @ velocity
-        extensions = heights + self.by_base * base[0] - self.zero
-        rates += self.by_base * base[1]
+        extensions = heights + self.by_base * base[0] + self.by_roof * roof[0] - self.zero
+        rates += self.by_base * base[1] + self.by_roof * roof[1]
         for law, way, x, rate in zip(self.laws, self.ways, extensions, rates, strict=True):
             total -= law.force(float(rate if law.of_rate else x)) * way
         return total
@@ -115,11 +155,11 @@ def in_place(
     rest : sequence of float
         Heights of the masses at rest under the static force, at the nominal height [m].
     """
-    ways, by_base, zero = np.zeros((len(laws), n)), np.zeros(len(laws)), np.zeros(len(laws))
+    ways, (by_base, by_roof, zero) = np.zeros((len(laws), n)), np.zeros((3, len(laws)))
     for j, law in enumerate(laws):
         ways[j, numbers[law.mass]] = 1.0
         if law.below < len(numbers):
             ways[j, numbers[law.below]] = -1.0
         else:
-            by_base[j], zero[j] = -1.0, rest[law.mass]
-    return LawsInPlace(tuple(laws), ways, by_base, zero)
+            (by_roof if law.of_roof else by_base)[j], zero[j] = -1.0, rest[law.mass]
+    return LawsInPlace(tuple(laws), ways, by_base, by_roof, zero)

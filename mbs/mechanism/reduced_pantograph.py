@@ -110,6 +110,7 @@ class RaisingPantograph(SteppedHead):
         if self._base is not None:
             motions = np.array([self._base.vertical(time) for time in times.tolist()])
             rows["base"], rows["base_velocity"], rows["base_acceleration"] = motions.T
+            rows["roof"], rows["roof_velocity"] = rows["base"], rows["base_velocity"]
         if self._air is not None:
             blown = self._blowing(self._air.at(times))
             rows["head_air"], rows["arm_air"], rows["bodies_air"] = blown.T
@@ -126,6 +127,7 @@ class RaisingPantograph(SteppedHead):
         if self._base is not None:
             moved = self._base.vertical(time)
             now["base"], now["base_velocity"], now["base_acceleration"] = moved
+            now["roof"], now["roof_velocity"] = moved.place, moved.velocity
         if self._air is not None:
             blown = self._blowing(self._air.now(time))
             now["head_air"], now["arm_air"], now["bodies_air"] = blown
@@ -151,7 +153,7 @@ class RaisingPantograph(SteppedHead):
         force[-1] += now["arm_air"] + now["bodies_air"] * sum(blown)
         if self._laws.laws:
             base = float(now["base"]), float(now["base_velocity"])
-            force += self._laws.pull(self.position, self.velocity, base)
+            force += self._laws.pull(self.position, self.velocity, base, base)
         masses = self._masses.copy()
         masses[-1] = mass
         return np.asarray(force / masses)

@@ -424,6 +424,8 @@ def nominal_height_rule(
     elasticity: Elasticity,
     air_speed: float | None = None,
     contact: ContactLaw | None = None,
+    *,
+    with_laws: bool = True,
 ) -> Callable[[Placement], float]:
     """Head height at which the static force is defined.
 
@@ -431,7 +433,8 @@ def nominal_height_rule(
     stretch of ``elasticity`` with the static force and that of still air at ``air_speed`` [m/s], so
     that the base spring neither adds to the mean force nor takes from it. The head of a chain that
     is tied to its base stands above the wires by the depth of its ``contact`` law; others change
-    their force by less than a hundredth over that depth, which is left out.
+    their force by less than a hundredth over that depth, which is left out. ``with_laws`` says
+    whether laws of pantographs that are not linear act.
     """
     x = elasticity.x
     at_rest = np.stack([wires.rest_height_of(wire, x) for wire in range(wires.n_wires)], axis=1)
@@ -444,7 +447,8 @@ def nominal_height_rule(
             force += steady_forces(placement.data, air_speed).whole
         lifted = elasticity.pressed(at_rest, force)
         above = 0.0
-        if contact is not None and isinstance(placement.data, LumpedData) and placement.data.tied:
+        data = placement.data if with_laws else replace(placement.data, laws=())
+        if contact is not None and isinstance(data, LumpedData) and data.tied:
             above = contact.depth(force / (len(placement.data.strips.offsets) * wires.n_wires))
         # By trapezoids; scipy.integrate, which has the rule, loads solvers for 0.03 s.
         mean = float(np.sum(np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0) / (x[-1] - x[0]))

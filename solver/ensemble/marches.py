@@ -118,7 +118,9 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
     laws, train = model.simulated, problem.train
     air_speed = train.speed if laws.meets_air else None
     shared.hang(lane, at_rest)
-    height = nominal_height_rule(lane.wires_at_rest, lift, air_speed, problem.contact)
+    height = nominal_height_rule(
+        lane.wires_at_rest, lift, air_speed, problem.contact, with_laws=laws.pantograph_laws
+    )
     pantographs = Pantographs(shared.comm, problem, laws, lane.wires_at_rest, height)
     for one in pantographs.models:
         stepped_by_kernels(one)  # an error of another would end a step of all lanes

@@ -482,8 +482,9 @@ class Simulation:
     @property
     def inputs(self) -> np.ndarray:
         """Inputs of each pantograph (n,), added from the next step on: ``lift_force`` to the static
-        force and ``head_force`` on the head, upward [N], and of its base the height ``base``
-        [m], ``base_velocity`` [m/s] and ``base_acceleration`` [m/s2]; all 0 at first."""
+        force and ``head_force`` on the head or its strips on springs, upward [N], and of its base
+        the height ``base`` [m], ``base_velocity`` [m/s] and ``base_acceleration`` [m/s2]; all 0 at
+        first."""
 
     @property
     def time(self) -> float:

@@ -157,7 +157,9 @@ def set_up_of(
     _refuse(at_rest)
     wires = ContactWires(model, form, distribute(model, 1, 0))
     air_speed = problem.train.speed if simulated.meets_air else None
-    height = nominal_height_rule(wires, lift, air_speed, problem.contact)
+    height = nominal_height_rule(
+        wires, lift, air_speed, problem.contact, with_laws=simulated.pantograph_laws
+    )
     pantographs = Pantographs(comm, problem, simulated, wires, height)
     heads = [_stepped(model) for model in pantographs.models]
     if pantographs.lateral and any(head.is_crossed for head in heads):

@@ -112,8 +112,11 @@ class March:
         self.ownership = distribute(model, comm.size, comm.rank)
         self._wire = ContactWires(model, form, self.ownership)
         air_speed = problem.train.speed if model.simulated.meets_air else None
-        height = nominal_height_rule(self._wire, elasticity, air_speed, problem.contact)
-        self._nominal_height, effects = height, model.simulated
+        effects = model.simulated
+        height = nominal_height_rule(
+            self._wire, elasticity, air_speed, problem.contact, with_laws=effects.pantograph_laws
+        )
+        self._nominal_height = height
         self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
         self._moving = MovingColumns()
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)

@@ -66,6 +66,30 @@ def test_the_plan_tells_incidents_in_order_of_time() -> None:
     assert "at 3 s: pantograph 1 is lowered" in third and "-75 N within 0.2 s" in third
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        # 60 N over 50 N/m would be 1.2 m.
+        ([], "its head is caught 0.4 m lower"),
+        (["pantographs.reference.stiffnesses_N_per_m=[4200,160]"], "holds its head at rest less"),
+        (
+            ["pantographs.reference.aerodynamics={uplift_polynomial=[0,0,0.001]}"],
+            "the air lifts it with 62.5 N, so that it stays up",  # 0.001 * 250^2
+        ),
+        (
+            ["pantographs.reference.aerodynamics={uplift_polynomial=[0,0,0.001]}"]
+            + ["effects.pantograph_aerodynamics=false"],
+            "its head is caught 0.4 m lower",
+        ),
+    ],
+)
+def test_the_plan_tells_what_becomes_of_a_head_that_is_lowered(words: list[str], says: str) -> None:
+    lowered = 'incidents=[{type="lowering",at_s=3.0}]'
+    found = load_scene("en50318_2002", [lowered, *words])
+    (fact,) = incident_facts(found, problem_of(found))
+    assert says in fact["says"]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_effect_that_is_left_out_is_not_told(kind: str) -> None:
     words = [INCIDENTS, f"effects.{kind}=false"]

@@ -15,10 +15,10 @@ CASE, KIND = "en50318_2002", "pantographs.reference"
 PI = "measures='contact_force',target=125,gains=[{at=0,error=0.1,integral_per_s=1.0}]"
 LAWS = {
     "{type='limiter',rise_m=0.1,stiffness_N_per_m=2e4}": Law(
-        1, 2, False, (-1.0, 0.1, 1.1), (0.0, 0.0, 2e4)
+        1, 2, False, (-1.0, 0.1, 1.1), (0.0, 0.0, 2e4), of_roof=True
     ),
     "{type='limiter',at_mass=1,force_by_rise=[[0.0,0.0],[0.1,50.0]]}": Law(
-        0, 2, False, (-1.0, 0.0, 0.1), (0.0, 0.0, 50.0)
+        0, 2, False, (-1.0, 0.0, 0.1), (0.0, 0.0, 50.0), of_roof=True
     ),
     "{type='damper',up_N_s_per_m=200,down_N_s_per_m=30}": Law(
         1, 2, True, (-1.0, 0.0, 1.0), (-30.0, 0.0, 200.0)

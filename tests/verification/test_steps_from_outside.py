@@ -65,6 +65,20 @@ def test_forces_act_on_each_kind_as_on_a_chain(kind: str, name: str) -> None:
     check("contact force [N]", forces(scene_with(kind), **added), chain, within=1e-6)
 
 
+def test_strips_on_springs_share_a_force_on_the_head_as_they_do_one_of_the_air() -> None:
+    """An uplift of 30 N on the head, which grows with the raising; equal to round-off."""
+    strips = {"number": 2, "spacing_m": 0.5, "mass_kg": 1.0, "stiffness_N_per_m": 750.0}
+    scene = scene_with("chain", **{"pantographs.two.strips": strips})
+    blown = scene.replace({"pantographs.two.aerodynamics": {"uplift_polynomial": [30.0]}})
+    found = forces(
+        scene,
+        head_force=lambda time: 15.0 * (1.0 - np.cos(np.pi * min(time / RAISED, 1.0))),
+    )
+    change = np.abs(found - forces(scene)).max()
+    assert change > 20.0
+    check("contact force [N]", found, forces(blown), within=1e-9 * change)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_base_that_is_moved_from_outside_is_one_that_the_vehicle_moves(kind: str) -> None:
     """b = -A cos wt, 10 mm at 2 Hz.

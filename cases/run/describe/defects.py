@@ -19,13 +19,16 @@ from catenary.cases.scene.line.imperfections import (
 from catenary.cases.scene.run.incidents import (
     DropperBreakTable,
     Incident,
+    LoweringTable,
     TensionLossTable,
     at_step,
 )
 from catenary.cases.scene.scene import Scene
+from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import counted, wire_words
+from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.problem import Problem
 
 
@@ -131,7 +134,7 @@ def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
             "type": table.type,
             "time_s": at_step(table.at_s, dt),
             **_place(table, problem.line),
-            "says": _sentence(table, problem.line),
+            "says": _sentence(table, problem),
         }
         for table in scene.incidents
         if table.type in problem.effects
@@ -151,7 +154,8 @@ def _place(table: Incident, line: Line) -> dict[str, float]:
     return _dropper(line, table.span, table.dropper)[0]
 
 
-def _sentence(table: Incident, line: Line) -> str:
+def _sentence(table: Incident, problem: Problem) -> str:
+    line = problem.line
     if isinstance(table, DropperBreakTable):
         return f"{_dropper(line, table.span, table.dropper)[1]}, breaks"
     if isinstance(table, TensionLossTable):
@@ -160,6 +164,20 @@ def _sentence(table: Incident, line: Line) -> str:
         return f"the tension of the {name} falls to {left:.4g} kN, {table.share:g} of what it was"
     return (
         f"pantograph {table.pantograph} is lowered: its static force goes over to "
-        f"{table.force_N:g} N within {table.within_s:g} s; its head is caught {table.drop_m:g} m "
-        "lower"
+        f"{table.force_N:g} N within {table.within_s:g} s; {_fall(table, problem)}"
     )
+
+
+def _fall(table: LoweringTable, problem: Problem) -> str:
+    """What becomes of a head that is lowered, by the forces at rest."""
+    from catenary.mbs.build import steady_forces
+
+    placement = problem.train.placements[table.pantograph - 1]
+    data, force = placement.data, table.force_N
+    if simulated(problem).meets_air and data.meets_air:
+        force += steady_forces(data, problem.train.speed).whole
+    if force >= 0.0:
+        return f"the air lifts it with {force - table.force_N:.4g} N, so that it stays up"
+    if isinstance(data, LumpedData) and -force < data.stiffnesses[-1] * table.drop_m:
+        return f"its base spring holds its head at rest less than {table.drop_m:g} m lower"
+    return f"its head is caught {table.drop_m:g} m lower"

@@ -53,6 +53,8 @@ def _description(placement: Placement, problem: Problem) -> str:
     data, acts = placement.data, simulated(problem)
     if not acts.flexible_strips:
         data = replace(data, strips=replace(data.strips, flexure=None))
+    if not acts.pantograph_laws:
+        data = replace(data, laws=())
     text = description_of(data, placement.static_force)
     if acts.raked_strips and placement.data.strips.rake:
         text += f"; strips raked by {math.degrees(placement.data.strips.rake):.3g} degrees"

@@ -182,7 +182,7 @@ def _law(table: LawTable, n: int) -> Law:
         if pairs is None:
             assert table.rise_m is not None and table.stiffness_N_per_m is not None
             pairs = [[table.rise_m, 0.0], [table.rise_m + 1.0, table.stiffness_N_per_m]]
-        return Law(mass, n, False, *_points([[_BELOW, 0.0], *pairs]))
+        return Law(mass, n, False, *_points([[_BELOW, 0.0], *pairs]), of_roof=True)
     below = mass + 1
     if isinstance(table, PneumaticDamperTable):
         pairs = table.force_by_velocity

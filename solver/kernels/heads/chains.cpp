@@ -70,9 +70,9 @@ void SprungHead::finish(const Drive& drive) {
     const int64_t n = this->n();
     const Array2<double> matrix = this->matrix();
     if (laws_.any())
-        laws_.settle(
-            {position_, velocity_, acceleration(), touch(), drive.base, drive.base_velocity},
-            newmark(), force_, matrix);
+        laws_.settle({position_, velocity_, acceleration(), touch(), drive.base,
+                      drive.base_velocity, drive.roof, drive.roof_velocity},
+                     newmark(), force_, matrix);
     else
         invert(matrix);
     const auto after = free();

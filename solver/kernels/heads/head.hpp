@@ -38,8 +38,8 @@ struct Drive {
     double base;                 ///< height of the base [m], over where it rests
     double base_velocity;        ///< [m/s]
     double base_acceleration;    ///< [m/s2]
-    double roof, roof_velocity;  ///< height of the housing that catches a lowered head, over where
-                                 ///< the housing rests [m], and velocity [m/s]
+    double roof, roof_velocity;  ///< height of the roof, with stops and the housing that catches a
+                                 ///< lowered head, over where it rests [m], and velocity [m/s]
     double head_air;             ///< force of the air on the head [N]
     double arm_air;              ///< force of the air on the arm of a mechanism [N]
     double bodies_air;  ///< lift by the air on the mechanism's bodies, in parts of the tables'

@@ -7,10 +7,11 @@
 
 namespace catenary {
 
-/// A law's extension is way @ coordinates + by_base * base - zero; it pulls by a table over this,
-/// or over its rate.
+/// A law's extension is way @ coordinates + by_base * base + by_roof * roof - zero; it pulls by a
+/// table over this, or over its rate.
 struct HeadLaw {
     double by_base;      ///< part of the base's height
+    double by_roof;      ///< part of the roof's
     double zero;         ///< where extensions count from [m]
     int64_t of_rate;     ///< whether its points are rates
     int64_t begin, end;  ///< its points, two at least
@@ -35,6 +36,7 @@ struct StepStart {
     std::span<const double> acceleration;        ///< of the state (n,)
     Array2<const double> touch;                  ///< (s, n), see `HeadArrays`
     double base, base_velocity;                  ///< [m], [m/s]
+    double roof, roof_velocity;                  ///< [m], [m/s]
 };
 
 /// The laws of a head, with room to settle in.

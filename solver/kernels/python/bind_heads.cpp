@@ -45,7 +45,7 @@ void offer_heads(py::module_& module) {
                   LinearStep, SprungMasses, ReducedMechanism>(module);
     CATENARY_OFFER_TYPE(module, "DRIVE", Drive, time, force, part, base, base_velocity,
                         base_acceleration, roof, roof_velocity, head_air, arm_air, bodies_air);
-    CATENARY_OFFER_TYPE(module, "HEAD_LAW", HeadLaw, by_base, zero, of_rate, begin, end);
+    CATENARY_OFFER_TYPE(module, "HEAD_LAW", HeadLaw, by_base, by_roof, zero, of_rate, begin, end);
     CATENARY_OFFER_TYPE(module, "HEAD_LAW_POINT", HeadLawPoint, at, force);
     CATENARY_OFFER_TYPE(module, "REGULATION", RegulationSettings, of_height, target, part, dt,
                         sample, least, most);

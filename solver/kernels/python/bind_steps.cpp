@@ -26,8 +26,7 @@ class HeldSimulation : public Simulation {
     using Simulation::Simulation;
     static bool step(HeldSimulation& simulation, int64_t n) {
         const Outcome outcome = simulation.Simulation::step(n);
-        if (outcome == Outcome::kNotFound)
-            throw std::runtime_error("the forces of a step could not be found");
+        if (outcome == Outcome::kNotFound) throw std::runtime_error("a step could not be taken");
         return outcome == Outcome::kDone;
     }
     py::bytes saved() const {

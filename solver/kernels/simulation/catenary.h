@@ -20,7 +20,7 @@ typedef struct catenary_simulation catenary_simulation;
 /* What a host adds to a pantograph, from the next step on. All are 0 at first. */
 typedef struct {
     double lift_force;        /* added to the static force */
-    double head_force;        /* on the head */
+    double head_force;        /* on the head; strips on springs of their own share it */
     double base;              /* added to the height of the base */
     double base_velocity;     /* of that */
     double base_acceleration; /* of that; only pantographs with bodies read it */
@@ -29,7 +29,8 @@ typedef struct {
 /* What a step ended with. */
 enum {
     CATENARY_DONE = 0,
-    CATENARY_NOT_FOUND = 1, /* its forces could not be found: nothing can be stepped further */
+    CATENARY_NOT_FOUND = 1, /* no forces fit it, or a mechanism would leave the heights that it can
+                             * reach: nothing can be stepped further but from an earlier state */
     CATENARY_AT_END = 2     /* the file has no inputs for a further step */
 };
 

@@ -66,7 +66,7 @@ void write_line(const std::string& path, PreparedLine& line);
 /// Inputs of a pantograph that a host adds, from the next step on.
 struct Input {
     double lift_force = 0.0;         ///< added to the static force [N]
-    double head_force = 0.0;         ///< upward on the head [N]
+    double head_force = 0.0;         ///< upward on the head, or shared by strips on springs [N]
     double base = 0.0;               ///< added height of the base [m]
     double base_velocity = 0.0;      ///< [m/s]
     double base_acceleration = 0.0;  ///< [m/s2]; read by mechanisms
@@ -80,7 +80,8 @@ class Simulation {
 
     enum class Outcome {
         kDone,
-        kNotFound,  ///< the forces of a step could not be found: nothing can be stepped further
+        kNotFound,  ///< no forces fit a step, or a mechanism would leave the heights that it can
+                    ///< reach: nothing can be stepped further
         kAtEnd,     ///< the line ends, or the file has no inputs for a further step
     };
     /// Take n steps, as far as that is possible.

@@ -215,12 +215,15 @@ def test_what_a_simulation_has_not_cannot_be_set(scene: catenary.Scene) -> None:
     assert repr(sim) == "<catenary.Simulation at 0 s, closed>"
 
 
-def test_forces_that_cannot_be_found_say_when_and_a_state_goes_on(scene: catenary.Scene) -> None:
+def test_a_step_that_cannot_be_taken_says_when_and_why_and_a_state_goes_on(
+    scene: catenary.Scene,
+) -> None:
     with catenary.Simulation(scene) as sim:
         sim.step(100)
         state = sim.save()
         sim.lift_force[0] = np.nan  # not checked: a view, for loops that must be quick
-        with pytest.raises(catenary.RunBroken, match=f"found after {sim.time:g} s"):
+        says = rf"taken after {sim.time:g} s: lift_force is \[nan\]; it must be finite"
+        with pytest.raises(catenary.RunBroken, match=says):
             sim.step()
         sim.restore(state)
         assert sim.step() and np.isfinite(sim.contact_force).all()
