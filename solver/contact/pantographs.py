@@ -76,9 +76,9 @@ class Pantographs:
 
     Each strip may touch each contact wire: these are the contacts, strip by strip.
 
-    Each is placed at the wire at rest, or ``start_below`` it. With a kinematic contact it already
-    moves up and down with the wire under way, V dw/dx: a head at rest would have to be brought to
-    that within one step.
+    Each is placed at the lowest wire at rest above its strips, or ``start_below`` that. With a
+    kinematic contact it is placed at the wire above its middle and already moves up and down with
+    that under way, V dw/dx: a head at rest would have to be brought to that within one step.
 
     Attributes
     ----------
@@ -165,7 +165,11 @@ class Pantographs:
         self.move_to(0.0)
         self.contact_force, self.head_height, self.wire_height = forces.reshape(3, self.n)
         self.wire_height[:] = wires.rest_height(self._start)
-        self.head_height[:] = self.wire_height - train.start_below
+        # Under a law with forces at a depth no strip may start within the wire.
+        heads = self.wire_height
+        if not isinstance(problem.contact, KinematicLaw):
+            heads = self._lowest_above_strips()
+        self.head_height[:] = heads - train.start_below
         self._write_outputs = native.write_outputs.bound(self)
         self._heads = Heads(self.n_contacts)
         numerics = problem.numerics
@@ -181,6 +185,13 @@ class Pantographs:
         self.along_track = False
         self._followed: list[FollowedPath] = []
         on_root(comm, lambda: self._make_all(problem, simulated, nominal_height), takes_long=True)
+
+    def _lowest_above_strips(self) -> np.ndarray:
+        """Lowest height of the wires at rest where strips of each pantograph are now, (n,) [m]."""
+        places = self.candidates.place.reshape(-1, self.n_wires).T
+        heights = [self._wires.rest_height_of(wire, x) for wire, x in enumerate(places)]
+        lowest = np.fmin.reduce(heights)
+        return np.fmin.reduceat(lowest, self.ends.of_pantograph[:-1])
 
     @property
     def n(self) -> int:

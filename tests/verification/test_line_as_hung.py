@@ -220,6 +220,16 @@ def test_a_hard_spot_hangs_on_the_wire_and_stands_still_on_its_spring() -> None:
     node = int(sprung.dofs(sprung.mesh.droppers[13:14, 1])[0])
     added = matrix_of(sprung, stiffness=1.0) - matrix_of(model, stiffness=1.0)
     check("spring [N/m]", added[node, node], 500.0, within=1e-8)
+    # Beside a mass, and under another tension, the spring still carries nothing: the line hangs as
+    # without it, and moves with it.
+    slack = WrongTension(CONTACT_WIRE, 0.8)
+    _, _, without, alone = hung(HardSpot(CONTACT_WIRE, x + 1.3, 5.0, 0.0), slack)
+    _, _, sprung, form = hung(HardSpot(CONTACT_WIRE, x + 1.3, 5.0, 500.0), slack)
+    check("heights beside a mass [m]", form.height, alone.height, within=1e-12)
+    added = matrix_of(sprung, stiffness=1.0) - matrix_of(without, stiffness=1.0)
+    lift = sprung.dofs(np.arange(sprung.mesh.n_nodes))
+    # A wire lifted as a whole is lifted there: the sum over its heights is that of the spring.
+    check("spring beside a mass [N/m]", added[np.ix_(lift, lift)].sum(), 500.0, within=1e-7)
 
 
 def test_irregular_heights_are_met_where_droppers_can_pull() -> None:

@@ -21,12 +21,13 @@ from catenary.cases.studies.stability.map import RESOLUTION, Grid, as_rows, draw
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
+from catenary.solver.problem.integrator_parameters import AVERAGE_ACCELERATION, integration_of
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 pytestmark = pytest.mark.study
 
 GRID = ((1e5, 0.5), (1e5, 8.0), (1e7, 2.0))
-NEWMARK = (0.25, 0.5)
+NEWMARK = theory.Methods(AVERAGE_ACCELERATION, AVERAGE_ACCELERATION)
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,41 @@ def test_theory_and_marches_find_the_same_limits(coupling: str, bench: Bench) ->
             check("omega dt = 2", found.theory, found.closed_form, within=1e-3 * found.closed_form)
 
 
+@pytest.mark.parametrize(
+    ("integrator", "spectral_radius"), [("generalized_alpha", 0.5), ("hht", 0.6)]
+)
+def test_other_integrators_have_limits_of_their_own(
+    integrator: str, spectral_radius: float, bench: Bench
+) -> None:
+    """At the limit of the explicit coupling all changes its sign from step to step. With b =
+    M^-1 f, a = b (1 - 2 a_f) / (1 - 2 a_m), d = (2 beta - gamma) dt^2 a / 2 and d* = -d + q beta
+    dt^2 b that is 1 = k dt^2 (g_line / m_wire + g_head / m_head) for masses alone, where
+
+        g = q beta - (beta - gamma / 2) (1 - 2 a_f) / (1 - 2 a_m),     q = (1 - a_f) / (1 - a_m)
+
+    and 1/4 for the head, which steps by average acceleration. Springs of the line, which act at d,
+    are some 1e5 N/m of 1e7 N/m in a contact.
+    """
+    problem = bench.rest.problem
+    numerics = replace(problem.numerics, integrator=integrator, spectral_radius=spectral_radius)
+    rest = bench.rest._replace(problem=replace(problem, numerics=numerics))
+    other, line = replace(bench, rest=rest), line_at(bench)
+    limits = {c: find(other, line, c, 1e7, 2.0) for c in ("implicit", "explicit", "iterated")}
+    assert all(one.agrees for one in limits.values())
+    assert np.isinf(limits["implicit"].theory) and np.isinf(limits["explicit"].closed_form)
+    beta, gamma, a_m, a_f = integration_of(integrator, spectral_radius)
+    q = (1.0 - a_f) / (1.0 - a_m)
+    of_line = q * beta - (beta - 0.5 * gamma) * (1.0 - 2.0 * a_f) / (1.0 - 2.0 * a_m)
+    expected = (1e7 * (of_line / line.mass + 0.25 / 2.0)) ** -0.5
+    found = limits["explicit"].theory
+    check("explicit [s]", found, expected, within=0.01 * expected)
+    usual = find(bench, line, "explicit", 1e7, 2.0).theory
+    assert found < 0.97 * usual, "it has another limit than average acceleration"
+    # Exchanges: masses alone resist within a step.
+    expected = (1e7 * (q * beta / line.mass + 0.25 / 2.0)) ** -0.5
+    check("iterated [s]", limits["iterated"].theory, expected, within=0.01 * expected)
+
+
 def test_a_tenth_more_than_the_limit_breaks_and_a_tenth_less_does_not(bench: Bench) -> None:
     """The other way round: a limit that is wrong by a tenth would be noticed."""
     line = line_at(bench)
@@ -95,12 +131,13 @@ def test_a_line_as_a_point_sees_it_is_the_line(bench: Bench) -> None:
     load = theory.loads_at(wire, bench.x, model.n_dofs)
     mass, stiffness, damping = (part.toarray() for part in theory.matrices(model))
     line = line_at(bench)
-    step = theory.Step(2e-3, *NEWMARK)
+    step = theory.Step(2e-3, NEWMARK)
     whole = theory.Coupled(
         linalg.block_diag(mass, np.diag(EN_PANTOGRAPH.masses)),
         linalg.block_diag(stiffness, EN_PANTOGRAPH.chain(EN_PANTOGRAPH.stiffnesses)),
         linalg.block_diag(damping, EN_PANTOGRAPH.chain(EN_PANTOGRAPH.dampings)),
         np.concatenate([-load, [[1.0], [0.0]]]),
+        len(load),
     )
     reduced = theory.couple(line, EN_PANTOGRAPH)
     check(
@@ -158,6 +195,23 @@ def test_the_map_of_a_case_is_found_drawn_and_written() -> None:
     # A march that contradicts theory is told, not hidden.
     wrong = replace(found.limits[1], stable=2 * rule, unstable=2.1 * rule)
     assert not wrong.agrees
+
+
+def test_what_is_not_of_the_linear_system_is_left_out() -> None:
+    """Steps that adapt, windows, stops, incidents and tolerances of a scene neither change the map
+    nor have it refused."""
+    grid = Grid((1e6,), (2.0,), (1e6,), (2.0,))
+    words = (
+        "numerics.adaptive_tolerance_N=0.1",
+        "line.steady_arm.uplift_stop_m=0.0005",
+        "incidents=[{type='lowering',at_s=0.5},{type='dropper_break',at_s=1,span=6,dropper=2}]",
+    )
+    own = "numerics.coupling=iterated", "numerics.eps_force_N=1e-3", "numerics.max_iterations=20"
+    plain, changed, exchanged, moving = (
+        make_map(read_draft("en50318_2002", these, True), MPI.COMM_SELF, grid)
+        for these in ((), words, own, ("window.mode=exact",))
+    )
+    assert plain.limits == changed.limits == exchanged.limits == moving.limits
 
 
 @pytest.mark.parametrize(

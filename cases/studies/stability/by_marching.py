@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from catenary.cases.studies.hard.runs import rest_height
+from catenary.cases.studies.stability.from_matrices import methods_of
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Problem
@@ -67,7 +68,7 @@ class Bench:
             start_below=-DEPTH,
             vehicle=None,
         )
-        eps_d = AGREED * DEPTH
+        eps_d, line = AGREED * DEPTH, methods_of(usual.numerics).line
         numerics = replace(
             usual.numerics,
             dt=dt,
@@ -75,7 +76,7 @@ class Bench:
             coupling="implicit" if coupling == "fixed_point" else coupling,
             eps_force=AGREED * DEPTH * stiffness,
             eps_d=eps_d,
-            eps_v=eps_d * usual.numerics.gamma / (usual.numerics.beta * dt),
+            eps_v=eps_d * line.gamma / (line.beta * dt),
             max_iterations=EXCHANGES,
         )
         return replace(

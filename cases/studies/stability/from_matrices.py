@@ -13,7 +13,10 @@ of Newmark's method is
 
 with predictions d*, v* and the contact stiffness k as k_i (implicit) or k_e (explicit). Exchanges
 of forces and motions, by ``iterated`` or the fixed-point correction, multiply errors of the forces
-by k beta dt^2 r^T A^-1 r.
+by k beta dt^2 r^T A^-1 r. Under HHT and generalized alpha the line's steps are those of Newmark's
+method for b = M^-1 (f - C v - K d) with a = p + q b, p known before (`docs/theory`,
+generalized_alpha.md): q beta and q gamma stand in A, and p in the predictions. Pantographs step by
+average acceleration then.
 """
 
 from __future__ import annotations
@@ -29,6 +32,8 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
+from catenary.solver.problem.integrator_parameters import Integration, integration_of
+from catenary.solver.problem.problem import Numerics
 
 # Vectors of Lanczos's method. What decides is within a few elements of the contact.
 N_VECTORS = 40
@@ -59,26 +64,61 @@ class PointModel:
 
 
 @dataclass(frozen=True)
+class Methods:
+    """How the ``line`` and the ``pantograph`` step."""
+
+    line: Integration
+    pantograph: Integration
+
+
+def methods_of(numerics: Numerics) -> Methods:
+    """The methods of a run."""
+    name, beta, gamma = numerics.integrator, numerics.beta, numerics.gamma
+    line = integration_of(name, numerics.spectral_radius, beta, gamma)
+    return Methods(line, Integration(beta, gamma))
+
+
+@dataclass(frozen=True)
 class Step:
-    """Newmark's step: ``dt`` [s], ``beta``, ``gamma``."""
+    """A step of ``dt`` [s]."""
 
     dt: float
-    beta: float
-    gamma: float
+    methods: Methods
 
 
 @dataclass(frozen=True)
 class Coupled:
     """Line and pantograph on two sides of c contacts.
 
-    ``mass``, ``stiffness``, ``damping`` (n, n) of both; ``depth`` (n, c) the contacts' depths for
-    unit displacements.
+    ``mass``, ``stiffness``, ``damping`` (n, n) of both, the first ``n_line`` unknowns being the
+    line's; ``depth`` (n, c) the contacts' depths for unit displacements.
     """
 
     mass: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
     depth: np.ndarray
+    n_line: int
+
+    def weights(self, methods: Methods) -> _Weights:
+        """What the ``methods`` make of each unknown."""
+        n = [self.n_line, len(self.depth) - self.n_line]
+        both = zip(methods.line, methods.pantograph, strict=True)
+        beta, gamma, a_m, a_f = (np.repeat(pair, n)[:, None] for pair in both)
+        share = (1.0 - a_f) / (1.0 - a_m)
+        return _Weights(beta, gamma, share, -a_m / (1.0 - a_m), a_f / (1.0 - a_m))
+
+
+@dataclass(frozen=True)
+class _Weights:
+    """Newmark's ``beta`` and ``gamma`` of each unknown, (n, 1) as all, and a = q b + p, where q is
+    the ``share`` of b and p is made with ``of_a`` and ``of_b`` from the step before."""
+
+    beta: np.ndarray
+    gamma: np.ndarray
+    share: np.ndarray
+    of_a: np.ndarray
+    of_b: np.ndarray
 
 
 def matrices(model: Model) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
@@ -177,25 +217,38 @@ def couple(line: PointModel, data: LumpedData) -> Coupled:
         linalg.block_diag(line.stiffness, data.chain(data.stiffnesses)),
         linalg.block_diag(line.damping, data.chain(data.dampings)),
         np.concatenate([-line.load, head]),
+        len(line.load),
     )
 
 
 def step_matrix(both: Coupled, step: Step, implicit: float, explicit: float) -> np.ndarray:
-    """Matrix of a step for (d, dt v, dt^2 a), shape (3 n, 3 n).
+    """Matrix of a step for (d, dt v, dt^2 a), and under HHT and generalized alpha dt^2 b; shape
+    (3 n, 3 n) or (4 n, 4 n).
 
     ``implicit`` and ``explicit`` are the parts of the contact's stiffness [N/m] that act at the
     end of the step and at the prediction.
     """
-    n, dt, beta, gamma = len(both.depth), step.dt, step.beta, step.gamma
+    n, dt, method = len(both.depth), step.dt, both.weights(step.methods)
     one, none = np.eye(n), np.zeros((n, n))
     spring = both.depth @ both.depth.T
     stiffness = both.stiffness + implicit * spring
-    operator = both.mass + gamma * dt * both.damping + beta * dt**2 * stiffness
-    place = np.hstack([one, one, (0.5 - beta) * one])
-    speed = np.hstack([none, one, (1.0 - gamma) * one])
+    weighted = any(step.methods.line[2:])
+    before = np.hstack([none, none, method.of_a * one, method.of_b * one])
+    place = np.hstack([one, one, (0.5 - method.beta) * one, none]) + method.beta * before
+    speed = np.hstack([none, one, (1.0 - method.gamma) * one, none]) + method.gamma * before
+    operator = _operator(both, step, stiffness)
     force = dt**2 * (stiffness + explicit * spring) @ place + dt * both.damping @ speed
-    found = -linalg.solve(operator, force, assume_a="sym")
-    return np.vstack([place + beta * found, speed + gamma * found, found])
+    found = -linalg.solve(operator, force)
+    moved = method.share * found
+    rows = [place + method.beta * moved, speed + method.gamma * moved, before + moved, found]
+    return np.vstack(rows) if weighted else np.vstack(rows[:3])[:, : 3 * n]
+
+
+def _operator(both: Coupled, step: Step, stiffness: np.ndarray) -> np.ndarray:
+    """A, (n, n), with the ``stiffness`` of both; each column by the method of its unknown."""
+    dt, method = step.dt, both.weights(step.methods)
+    by_speed, by_place = method.share * method.gamma * dt, method.share * method.beta * dt**2
+    return np.asarray(both.mass + by_speed.T * both.damping + by_place.T * stiffness)
 
 
 def radius(both: Coupled, step: Step, stiffness: float, coupling: str) -> float:
@@ -208,15 +261,15 @@ def radius(both: Coupled, step: Step, stiffness: float, coupling: str) -> float:
 def exchange_ratio(both: Coupled, step: Step, stiffness: float) -> float:
     """Largest factor by which an exchange of forces and motions multiplies errors of the forces,
     between line and head, ``both``, on a contact of ``stiffness`` [N/m]."""
-    operator = both.mass + step.gamma * step.dt * both.damping
-    operator = operator + step.beta * step.dt**2 * both.stiffness
-    answer = linalg.solve(operator, both.depth, assume_a="sym")
-    return stiffness * step.beta * step.dt**2 * _largest(both.depth.T @ answer)
+    method = both.weights(step.methods)
+    answer = linalg.solve(_operator(both, step, both.stiffness), both.depth)
+    moved = method.share * method.beta * step.dt**2 * answer
+    return stiffness * _largest(both.depth.T @ moved)
 
 
 def largest_step(
     both: Coupled,
-    newmark: tuple[float, float],
+    methods: Methods,
     stiffness: float,
     coupling: str,
     steps: tuple[float, float],
@@ -227,7 +280,7 @@ def largest_step(
     Parameters
     ----------
     both : line and head
-    newmark : beta and gamma
+    methods : by which both step
     stiffness : of the contact [N/m]
     coupling : "implicit", "explicit", or any other, which exchanges
     steps : least and greatest [s]
@@ -235,7 +288,7 @@ def largest_step(
     """
 
     def excess(log_dt: float) -> float:
-        step = Step(float(np.exp(log_dt)), *newmark)
+        step = Step(float(np.exp(log_dt)), methods)
         if coupling in ("implicit", "explicit"):
             return radius(both, step, stiffness, coupling) - max(allowed, STABLE)
         return exchange_ratio(both, step, stiffness) - allowed

@@ -37,14 +37,23 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.postproc.report.pictures import figures
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
+from catenary.solver.problem.integrator_parameters import AVERAGE_ACCELERATION
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest
 
-# Newmark's method and a linear problem: one contact that neither parts nor damps, taut droppers.
+# A linear problem: one contact that neither parts nor damps, taut droppers, steps as tried.
 _LINEAR = (
     "numerics.iterations=",
-    "numerics.spectral_radius=",
-    "numerics.integrator=newmark",
+    "numerics.adaptive_tolerance_N=",
+    "numerics.smallest_dt_s=",
+    "numerics.eps_d_m=",
+    "numerics.eps_v_m_per_s=",
+    "numerics.eps_force_N=",
+    "numerics.max_iterations=",
+    "window.mode=off",
+    "window.tolerance=",
+    "window.spans_ahead=",
+    "window.spans_behind=",
     "numerics.coupling=",
     "numerics.scheme=one_solve",
     "contact.restitution=",
@@ -56,6 +65,11 @@ _LINEAR = (
     "effects.contact_loss=false",
     "effects.residual_dropper_stiffness=false",
     "effects.dropper_slackening=false",
+    "effects.uplift_stops=false",
+    "effects.pantograph_laws=false",
+    "effects.regulated_lift=false",
+    "effects.gusts=false",
+    "incidents=",
 )
 # Steps of the map [s], and how closely a limit is found by marching.
 STEPS_RANGE = (1e-5, MAX_DT)
@@ -66,7 +80,6 @@ _THEORY_RANGE = (STEPS_RANGE[0], 4.0 * MAX_DT)
 _START = 10.0
 # Steps with which the implicit coupling, which has no limit, is tried [s].
 _TRIED = (1e-5, 1e-4, 1e-3, 1e-2, MAX_DT)
-AVERAGE_ACCELERATION = (0.25, 0.5)
 # Differences below this are round-off of the bisections.
 _SLACK = 1e-4
 
@@ -268,14 +281,14 @@ def find(
     ``bench`` marches the line of the map, and ``line`` is its model for theory.
     """
     numerics = bench.rest.problem.numerics
-    newmark = numerics.beta, numerics.gamma
+    methods = theory.methods_of(numerics)
     masses = (head_mass, *bench.data.masses[1:])
     both = theory.couple(line, LumpedData(masses, bench.data.stiffnesses, bench.data.dampings))
     seen = GROWN ** (1.0 / STEPS)
     if coupling not in ("implicit", "explicit"):
         seen = (AGREED / _START) ** (1.0 / EXCHANGES)
     expected, visible = (
-        theory.largest_step(both, newmark, stiffness, coupling, _THEORY_RANGE, allowed)
+        theory.largest_step(both, methods, stiffness, coupling, _THEORY_RANGE, allowed)
         for allowed in (1.0, seen)
     )
     if coupling == "implicit":
@@ -286,7 +299,7 @@ def find(
     else:
         stable, unstable = bench.bracket(coupling, stiffness, head_mass, STEPS_RANGE, RESOLUTION)
         closed = np.inf
-        if newmark == AVERAGE_ACCELERATION:
+        if methods.line == AVERAGE_ACCELERATION:
             closed = theory.closed_form(line, head_mass, stiffness)
     return Limit(coupling, stiffness, head_mass, expected, visible, closed, stable, unstable)
 
@@ -375,7 +388,7 @@ def draw(found: StabilityMap) -> Figure:
         f"linear system);\n{meets(found)} {found.wire_mass:.2g} kg"
     )
     figure.suptitle(title, x=0.01, ha="left", fontsize="medium")
-    figure.legend(handles=_key(), loc="outside lower center", ncols=3, frameon=False, **small)
+    figure.legend(handles=_key(found), loc="outside lower center", ncols=3, frameon=False, **small)
     return figure
 
 
@@ -420,8 +433,10 @@ def _panel(
         axes.set_ylim(bottom, top)
 
 
-def _key() -> list[Line2D]:
-    lines = (("-", "explicit, theory (ω dt = 2)"), ("--", "exchanges, theory"))
+def _key(found: StabilityMap) -> list[Line2D]:
+    closed = any(np.isfinite(one.closed_form) for one in found.limits)
+    explicit = "explicit, theory" + (" (ω dt = 2)" if closed else "")
+    lines = (("-", explicit), ("--", "exchanges, theory"))
     grey = figures.GREY
     keys = [Line2D([], [], color=grey, lw=1.2, ls=style, label=name) for style, name in lines]
     return keys + [
