@@ -37,14 +37,6 @@ class Law:
     points: tuple[float, ...]
     forces: tuple[float, ...]
 
-    def force(self, x: float) -> float:
-        """Force at ``x``, an extension [m] or a rate [m/s], that pulls together where it is
-        positive [N]."""
-        i = int(np.searchsorted(self.points, x, side="right")) - 1
-        i = min(max(i, 0), len(self.points) - 2)
-        slope = (self.forces[i + 1] - self.forces[i]) / (self.points[i + 1] - self.points[i])
-        return self.forces[i] + slope * (x - self.points[i])
-
 
 @dataclass(frozen=True)
 class LawsInPlace:
@@ -75,28 +67,6 @@ class LawsInPlace:
         return native.HeadLaws(
             self.ways, law, np.array(points, dtype=native.HEAD_LAW_POINT), np.zeros(n_contacts)
         )
-
-    def pull(
-        self, position: np.ndarray, velocity: np.ndarray, base: tuple[float, float]
-    ) -> np.ndarray:
-        """Forces on the coordinates (n,), upward [N].
-
-        Parameters
-        ----------
-        position : ndarray, shape (n,)
-            Coordinates [m].
-        velocity : ndarray, shape (n,)
-            Their velocities [m/s].
-        base : tuple of float
-            Height [m] and velocity [m/s] of the base.
-        """
-        total = np.zeros(self.ways.shape[1])
-        heights, rates = self.ways @ position, self.ways @ velocity
-        extensions = heights + self.by_base * base[0] - self.zero
-        rates += self.by_base * base[1]
-        for law, way, x, rate in zip(self.laws, self.ways, extensions, rates, strict=True):
-            total -= law.force(float(rate if law.of_rate else x)) * way
-        return total
 
 
 def in_place(

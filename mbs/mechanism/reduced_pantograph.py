@@ -20,12 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.air import SQUARE, AirForces
-from catenary.mbs.head.head_arrays import named, tables_at
+from catenary.mbs.head.head_arrays import named
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
-from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import lifted
 from catenary.solver.kernels import native
@@ -78,30 +77,23 @@ class RaisingPantograph(SteppedHead):
         self._data = data
         self._air = air
         self._zero = data.head_offset + data.base_height
-        self._masses = np.append(head.masses, 0.0)
-        self._stiffness, self._damping = head.stiffness, head.damping
-        self._tables = data.frame.tables
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
+        self._masses = np.append(head.masses, 0.0)
+        self._stiffness, self._damping = head.stiffness, head.damping
+        self._step_by(self._sprung(self._arrays))
+
+    def _sprung(self, arrays: native.HeadArrays) -> native.RaisedHead:
+        data = self._data
         sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
-        mechanism = native.ReducedMechanism(self._tables, data.head_weight, self._zero)
-        self._raised = native.RaisedHead(self._arrays, sprung, self._law_arrays, mechanism)
-        self._step_by(self._raised)
+        mechanism = native.ReducedMechanism(data.frame.tables, data.head_weight, self._zero)
+        return native.RaisedHead(arrays, sprung, self._law_arrays, mechanism)
 
-    def predict(self, time: float) -> HeadState:
-        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
-
-        Raises
-        ------
-        RunBroken
-            The mechanism has left the heights that it can reach.
-        """
-        self._aim(time)
-        self._move_base(time)
+    def _step(self, stepped: native.Head, time: float) -> None:
+        assert isinstance(stepped, native.RaisedHead)
         # NaN is left to the coupling, which refuses it.
-        if not self._raised.step(self.row):
-            raise self._data.frame.left(self._raised.height, time)
-        return self.head
+        if not stepped.step(self.row):
+            raise self._data.frame.left(stepped.height, time)
 
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
@@ -119,8 +111,7 @@ class RaisingPantograph(SteppedHead):
         """Height of the base at ``time`` [s], in the line's heights [m]."""
         return self._data.base_height + lifted(self._base, time)[0]
 
-    def _move_base(self, time: float) -> None:
-        """Put lift and base to ``time`` [s]."""
+    def _put_drive(self, time: float) -> None:
         now = self._now
         now["part"] = self._part(time)
         if self._base is not None:
@@ -135,30 +126,3 @@ class RaisingPantograph(SteppedHead):
         blown = forces.copy()
         blown[..., 0] += self._data.blown_head * forces[..., SQUARE]
         return blown
-
-    def _acceleration(self, time: float) -> np.ndarray:
-        self._move_base(time)
-        now = self._now[()]
-        (mass, lift, slowing, carried, *blown), (mass_slope, *_) = self._columns_at(
-            self.position[-1] - self._zero - now["base"]
-        )
-        speed = self.velocity[-1] - now["base_velocity"]
-        force = -self._stiffness @ self.position - self._damping @ self.velocity
-        lifting = now["part"] * (lift - self._data.head_weight)
-        force[-1] += lifting - slowing * speed - 0.5 * mass_slope * speed**2
-        force[-1] += (mass - carried) * now["base_acceleration"]
-        force += now["head_air"] * self._push
-        force[-1] += now["arm_air"] + now["bodies_air"] * sum(blown)
-        if self._laws.laws:
-            base = float(now["base"]), float(now["base_velocity"])
-            force += self._laws.pull(self.position, self.velocity, base)
-        masses = self._masses.copy()
-        masses[-1] = mass
-        return np.asarray(force / masses)
-
-    def _columns_at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
-        """All columns of the mechanism's tables and their slopes at a height above the base [m]."""
-        breaks = self._tables.breaks
-        if not breaks[0] <= height <= breaks[-1]:
-            raise self._data.frame.left(height)
-        return tables_at(self._tables, height)
