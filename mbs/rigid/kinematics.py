@@ -76,21 +76,6 @@ def difference(a: Quantity, b: Quantity) -> Quantity:
     return Quantity(*(x - y for x, y in zip(a, b, strict=True)))
 
 
-def total(a: Quantity, b: Quantity) -> Quantity:
-    """a + b."""
-    return Quantity(*(x + y for x, y in zip(a, b, strict=True)))
-
-
-def scaled(a: Quantity, by: Law) -> Quantity:
-    """c(t) a for a given number c, ``by``, with its time derivatives."""
-    return Quantity(
-        by.value * a.value,
-        by.value * a.jacobian,
-        by.value * a.rate + by.first * a.value,
-        by.value * a.drift + 2.0 * by.first * a.rate + by.second * a.value,
-    )
-
-
 def applied_to(a: Quantity, f: Law) -> Quantity:
     """f(a) of one number a, given f and its derivatives there."""
     return Quantity(

@@ -13,11 +13,37 @@ from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
 from catenary.mbs.rigid.bodies import Body, Motion, Vector, normalised
-from catenary.mbs.rigid.forces import BumpStop, Force, Gravity, SpringDamper
+from catenary.mbs.rigid.forces import BetweenPoints, BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import unit
-from catenary.mbs.rigid.kinematics import Law, point
+from catenary.mbs.rigid.kinematics import Law, difference, point
 from catenary.mbs.rigid.least_squares import null_space
 from catenary.mbs.rigid.system import System
+
+
+class LineBetween(NamedTuple):
+    """The line between points of two bodies: its length [m], its rate [m/s], d length / d q."""
+
+    length: float
+    rate: float
+    gradient: np.ndarray
+
+
+def line_of(force: BetweenPoints, motion: Motion) -> LineBetween:
+    """The line along which a force acts, from the kinematics of its points."""
+    between = difference(point(motion, force.j, force.at_j), point(motion, force.i, force.at_i))
+    length = float(np.linalg.norm(between.value))
+    way = between.value / length
+    return LineBetween(length, float(way @ between.rate), way @ between.jacobian)
+
+
+def generalised(force: Force, motion: Motion, time: float = 0.0) -> np.ndarray:
+    """Generalised forces (6 n,) of a force alone, from the kinematics of its points."""
+    if not isinstance(force, BetweenPoints):
+        return force.generalised(motion, time)
+    line, (stiffness, free_length, damping, preload) = line_of(force, motion), force.linear
+    pull = stiffness * (line.length - free_length) + damping * line.rate + preload
+    pull += force.pull(line.length) if force.pull is not None else 0.0
+    return np.asarray(-pull * line.gradient)
 
 
 class Reaction(NamedTuple):
@@ -44,12 +70,12 @@ def stored_energy(force: Force, motion: Motion) -> float:
     if isinstance(force, Gravity):
         return float(force.acceleration * np.dot(force.masses, motion.position[:-1, 2]))
     if isinstance(force, BumpStop):
-        length = force.line(motion).length
+        length = line_of(force, motion).length
         depth = max(force.shortest - length, length - force.longest, 0.0)
         return 0.5 * force.stiffness * depth**2
     if not isinstance(force, SpringDamper):
         return 0.0
-    extension = force.line(motion).length - force.free_length
+    extension = line_of(force, motion).length - force.free_length
     if callable(force.stiffness):
         closely = {"epsabs": 1e-12, "epsrel": 1e-12, "limit": 200}
         return float(integrate.quad(force.stiffness, 0.0, extension, **closely)[0])
