@@ -13,6 +13,11 @@ namespace {
 /// Segments of tables mostly settle in two rounds; a cycle of segments is left after so many.
 constexpr int kMostRounds = 20;
 
+/// Extension of a law, or its rate, by the motion of the base alone.
+double by_base(const HeadLaw& law, const StepStart& start) {
+    return law.of_rate ? law.by_base * start.base_velocity : law.by_base * start.base - law.zero;
+}
+
 }  // namespace
 
 SettlingLaws::SettlingLaws(const HeadLaws& laws, int64_t n)
@@ -34,8 +39,7 @@ bool SettlingLaws::find_segments(const StepStart& start, const NewmarkFactors& n
     for (int64_t j = 0; j < size(laws_.law); ++j) {
         const HeadLaw& law = laws_.law[j];
         const auto way = laws_.ways[j];
-        double at =
-            law.of_rate ? law.by_base * start.base_velocity : law.by_base * start.base - law.zero;
+        double at = by_base(law, start);
         for (int64_t i = 0; i < size(way); ++i)
             at += way[i] * (law.of_rate ? start.velocity[i] + newmark.velocity * acceleration_[i]
                                         : start.position[i] + newmark.position * acceleration_[i]);
@@ -58,8 +62,7 @@ void SettlingLaws::add(int64_t number, const StepStart& start, const NewmarkFact
     const double slope = (high.force - low.force) / (high.at - low.at);
     const double factor = law.of_rate ? newmark.velocity : newmark.position;
     const auto predicted = law.of_rate ? start.velocity : start.position;
-    double at =
-        law.of_rate ? law.by_base * start.base_velocity : law.by_base * start.base - law.zero;
+    double at = by_base(law, start);
     for (int64_t i = 0; i < n; ++i) at += way[i] * predicted[i];
     const double pull = low.force + slope * (at - low.at);
     for (int64_t i = 0; i < n; ++i) {

@@ -81,17 +81,9 @@ template <class T>
 std::array<int64_t, 1> shape_of(std::span<T> array) {
     return {size(array)};
 }
-template <class T>
-std::array<int64_t, 2> shape_of(const Array2<T>& array) {
-    return {array.rows, array.columns};
-}
-template <class T>
-std::array<int64_t, 3> shape_of(const Array3<T>& array) {
-    return {array.n, array.rows, array.columns};
-}
-template <class T>
-std::array<int64_t, 4> shape_of(const Array4<T>& array) {
-    return {array.n, array.parts, array.rows, array.columns};
+template <TableType T>
+auto shape_of(T array) {
+    return std::apply([](auto... size) { return std::array{size...}; }, array.sizes());
 }
 
 /// Refuse a value of a function or record with these sizes unless it has the wanted shape; `own`
@@ -147,12 +139,9 @@ struct FromArray {
 };
 template <class T>
 struct From<std::span<T>> : FromArray<std::span<T>, T, 1> {};
-template <class T>
-struct From<Array2<T>> : FromArray<Array2<T>, T, 2> {};
-template <class T>
-struct From<Array3<T>> : FromArray<Array3<T>, T, 3> {};
-template <class T>
-struct From<Array4<T>> : FromArray<Array4<T>, T, 4> {};
+template <TableType T>
+struct From<T> : FromArray<T, std::remove_pointer_t<decltype(T::data)>,
+                           std::tuple_size_v<decltype(T().sizes())>> {};
 /// An object of a bound class, which is kept alive.
 template <class T>
 struct From<T*> {
