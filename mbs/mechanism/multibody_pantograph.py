@@ -117,8 +117,8 @@ class Head(NamedTuple):
     damping: float
     weight: float
     offset: float
-    roll: Turning | None
-    pitch: Turning | None
+    roll: Turning | None = None
+    pitch: Turning | None = None
 
 
 class Standing(NamedTuple):

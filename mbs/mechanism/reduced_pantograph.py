@@ -24,7 +24,8 @@ from catenary.mbs.head.head_arrays import named
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
+from catenary.mbs.head.strips import ONE_STRIP, Strips, head_parts
+from catenary.mbs.mechanism.multibody_pantograph import Head
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import lifted
 from catenary.solver.kernels import native
@@ -34,24 +35,17 @@ from catenary.solver.kernels import native
 class RaisingData:
     """A head on a mechanism.
 
-    ``frame``: mass, lift and damping over the arm's height above the base; ``head_mass`` [kg],
-    ``head_stiffness`` [N/m] and ``head_damping`` [N s/m] between head and arm; ``head_weight`` [N];
-    ``head_offset`` [m], height of the head above the arm at rest without contact; ``base_height``
-    [m] of the base, in the line's heights. ``strips`` are part of the head, which may turn about
-    the track as ``roll`` says. ``blown_head`` [N] is what the air on bodies lifts the head by,
-    where it meets them as the frame's tables have it. ``laws`` that are not linear act on head and
-    arm besides; both are at the heights ``rest`` [m] where the static force holds.
+    ``frame``: mass, lift and damping over the arm's height above the base; ``base_height`` [m] of
+    the base, in the line's heights. ``strips`` are part of the head. ``blown_head`` [N] is what the
+    air on bodies lifts the head by, where it meets them as the frame's tables have it. ``laws``
+    that are not linear act on head and arm besides; both are at the heights ``rest`` [m] where the
+    static force holds.
     """
 
     frame: ReducedMechanism
-    head_mass: float
-    head_stiffness: float
-    head_damping: float
-    head_weight: float
-    head_offset: float
+    head: Head
     base_height: float = 0.0
     strips: Strips = ONE_STRIP
-    roll: Turning | None = None
     blown_head: float = 0.0
     laws: tuple[Law, ...] = ()
     rest: tuple[float, float] = (0.0, 0.0)
@@ -71,12 +65,12 @@ class RaisingPantograph(SteppedHead):
     """
 
     def __init__(self, data: RaisingData, stepping: Stepping, air: AirForces | None = None) -> None:
-        values = data.head_mass, data.head_stiffness, data.head_damping
-        head = head_parts(*values, data.strips, data.roll if stepping.lateral is not None else None)
+        roll = data.head.roll if stepping.lateral is not None else None
+        head = head_parts(*data.head[:3], data.strips, roll)
         super().__init__(head, head.n + 1, stepping)
         self._data = data
         self._air = air
-        self._zero = data.head_offset + data.base_height
+        self._zero = data.head.offset + data.base_height
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
         self._masses = np.append(head.masses, 0.0)
@@ -86,7 +80,7 @@ class RaisingPantograph(SteppedHead):
     def _sprung(self, arrays: native.HeadArrays) -> native.RaisedHead:
         data = self._data
         sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
-        mechanism = native.ReducedMechanism(data.frame.tables, data.head_weight, self._zero)
+        mechanism = native.ReducedMechanism(data.frame.tables, data.head.weight, self._zero)
         return native.RaisedHead(arrays, sprung, self._law_arrays, mechanism)
 
     def _step(self, stepped: native.Head, time: float) -> None:

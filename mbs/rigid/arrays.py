@@ -7,8 +7,9 @@ of their own.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class Product(NamedTuple):
 
 
 class Joint(Protocol):
-    """Interface of a joint to a system of bodies."""
+    """Interface of a joint to a system of bodies; its rows are its products, mostly."""
 
     @property
     def name(self) -> str: ...
@@ -47,13 +48,16 @@ class Joint(Protocol):
     @property
     def n_lengths(self) -> int: ...
 
-    @property
-    def n_rows(self) -> int | None:
-        """Number of its rows; None if these are its products."""
-
     def products(self) -> list[Product]:
         """The scalar products that its rows are made of."""
 
+
+class MadeRows(ABC):
+    """A joint whose ``n_rows`` rows follow from its products otherwise."""
+
+    n_rows: ClassVar[int]
+
+    @abstractmethod
     def rows(self, products: Quantity, time: float) -> Quantity:
         """Phi with its derivatives at ``time`` [s], made of its products."""
 
@@ -84,14 +88,16 @@ class FlatRows:
     def __init__(self, joints: Sequence[Joint], start: Motion) -> None:
         flat: list[Product] = []
         self.ranges: dict[str, slice] = {}  # rows of each joint, by its name
-        self._made: list[tuple[slice, Joint]] = []  # rows that are made of these products
+        self._made: list[tuple[slice, MadeRows]] = []  # rows that are made of these products
         begin = 0
         for joint in joints:
-            products = joint.products()
-            if joint.n_rows is not None:
+            products, end = joint.products(), begin
+            if isinstance(joint, MadeRows):
                 self._made.append((slice(len(flat), len(flat) + len(products)), joint))
+                end += joint.n_rows
+            else:
+                end += len(products)
             flat += products
-            end = begin + (len(products) if joint.n_rows is None else joint.n_rows)
             self.ranges[joint.name] = slice(begin, end)
             begin = end
         self._laws = [(k, row.law) for k, row in enumerate(flat) if row.law]

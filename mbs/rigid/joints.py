@@ -19,7 +19,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
-from catenary.mbs.rigid.arrays import ORIGIN, Product, TimeLaw
+from catenary.mbs.rigid.arrays import ORIGIN, MadeRows, Product, TimeLaw
 from catenary.mbs.rigid.bodies import SPACE, Vector, rotation_matrix
 from catenary.mbs.rigid.kinematics import (
     Law,
@@ -95,18 +95,8 @@ def across_axis(i: str, normals: Sequence[Vector], j: str, axis: Vector) -> list
     return [Product(i, normal, j, axis) for normal in normals]
 
 
-class _RowsAreProducts:
-    """A joint each row of which is one scalar product."""
-
-    n_rows: ClassVar[int | None] = None
-
-    def rows(self, products: Quantity, time: float) -> Quantity:
-        """Phi with its derivatives."""
-        return products
-
-
 @dataclass(frozen=True)
-class _BetweenPoints(_RowsAreProducts):
+class _BetweenPoints:
     """A joint between a point ``at_i`` of body ``i`` and a point ``at_j`` of body ``j``."""
 
     name: str
@@ -202,7 +192,7 @@ class RevolutePrismatic(_BetweenPoints):
 
 
 @dataclass(frozen=True)
-class Fixed(_RowsAreProducts):
+class Fixed:
     """Body j is held by body i, or in space: six rows.
 
     ``parameters`` are the unit Euler parameters (4,) of body j as seen from body i.
@@ -226,7 +216,7 @@ class Fixed(_RowsAreProducts):
 
 
 @dataclass(frozen=True)
-class PointOnCurve:
+class PointOnCurve(MadeRows):
     """A point of a body stays on a curve y(x), z(x) in space: two rows.
 
     ``x``, ``y``, ``z`` are points of the curve, shape (n,) [m], n >= 2, joined by natural cubic
@@ -264,7 +254,7 @@ class PointOnCurve:
 
 
 @dataclass(frozen=True)
-class PrescribedPoint(_RowsAreProducts):
+class PrescribedPoint:
     """A point of a body has a prescribed coordinate along a direction in space: one row.
 
     The coordinate [m] is measured from the origin; ``along`` need not have length one.
@@ -283,7 +273,7 @@ class PrescribedPoint(_RowsAreProducts):
 
 
 @dataclass(frozen=True)
-class PrescribedAngle(_RowsAreProducts):
+class PrescribedAngle:
     """Body j is turned by a prescribed ``angle`` [rad] about an axis of body i: one row.
 
     At the angle zero ``normal_j`` points along ``normal_i``; both are across the axis. Whatever

@@ -94,15 +94,15 @@ def static_force(pantograph: RaisingPantograph, head_height: float, time: float 
     The head's springs give way under it. The air acts as it does at a ``time`` [s].
     """
     data, force = pantograph._data, 0.0
-    frame, zero = data.frame, data.head_offset + data.base_height
+    frame, zero = data.frame, data.head.offset + data.base_height
     on_head, on_arm, on_bodies = np.zeros(3)
     if pantograph._air is not None:
         on_head, on_arm, on_bodies = pantograph._blowing(pantograph._air.now(time))
     for _ in range(50):
         previous, below = force, force - on_head
-        arm = head_height + below / data.head_stiffness + data.strips.compression(below) - zero
+        arm = head_height + below / data.head.stiffness + data.strips.compression(below) - zero
         (_, lift, _), _ = frame.at(arm)
-        force = lift - data.head_weight + on_head + on_arm + on_bodies * frame.blown_at(arm)
+        force = lift - data.head.weight + on_head + on_arm + on_bodies * frame.blown_at(arm)
         if abs(force - previous) <= 1e-10 * abs(force):
             return float(force)
     raise AssertionError("the head's springs give way faster than the lift falls")

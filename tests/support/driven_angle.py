@@ -7,14 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from catenary.mbs.rigid.arrays import Product, TimeLaw
+from catenary.mbs.rigid.arrays import MadeRows, Product, TimeLaw
 from catenary.mbs.rigid.bodies import Vector
 from catenary.mbs.rigid.joints import across_axis, unit
 from catenary.mbs.rigid.kinematics import Law, Quantity
 
 
 @dataclass(frozen=True)
-class DrivenAngle:
+class DrivenAngle(MadeRows):
     """`PrescribedAngle` with a ``law`` of time for its angle [rad]."""
 
     name: str

@@ -16,6 +16,7 @@ from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.mechanism.multibody_pantograph import Head
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
@@ -32,7 +33,7 @@ FRAME = ReducedMechanism(
     20.0 * np.ones_like(HEIGHTS),
     name="tall",
 )
-RAISING = RaisingData(FRAME, 7.8, 6000.0, 26.0, 76.0, 0.08, base_height=3.6)
+RAISING = RaisingData(FRAME, Head(7.8, 6000.0, 26.0, 76.0, 0.08), base_height=3.6)
 
 
 def newmark(
@@ -118,7 +119,7 @@ def test_a_mechanism_beyond_its_reach_says_where_and_when() -> None:
 def test_prediction_and_compliance_are_what_a_step_does_for_any_forces() -> None:
     """A step is linear in the forces of all strips: differences of steps are exact."""
     strips = Strips(2, 0.5, 1.6, Suspension(1.2, 9000.0, 30.0), Turning(0.4, 300.0, 2.0))
-    data = RaisingData(FRAME, 7.8, 6000.0, 26.0, 76.0, 0.08, 3.6, strips)
+    data = RaisingData(FRAME, Head(7.8, 6000.0, 26.0, 76.0, 0.08), 3.6, strips)
     ends, heads = [], []
     for forces in ([0.0, 0.0], [40.0, 0.0], [0.0, 40.0]):
         pantograph = RaisingPantograph(data, Stepping(0.0, DT, BETA, GAMMA))
