@@ -19,12 +19,12 @@ from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
-from catenary.mbs.rigid.arrays import ORIGIN, body_products
+from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import SPACE, Motion
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
-from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.kinematics import body_products, point
 from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
 from catenary.mbs.rigid.step_solvers import StepSolver

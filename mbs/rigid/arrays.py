@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from catenary.mbs.rigid.bodies import SPACE, Motion, Vector
-from catenary.mbs.rigid.kinematics import Law, Quantity, number_of, part_of, stacked
+from catenary.mbs.rigid.kinematics import Law, Quantity, body_products, number_of, part_of, stacked
 from catenary.solver.kernels import native
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -60,15 +60,6 @@ class MadeRows(ABC):
     @abstractmethod
     def rows(self, products: Quantity, time: float) -> Quantity:
         """Phi with its derivatives at ``time`` [s], made of its products."""
-
-
-def body_products(motion: Motion, rows: np.ndarray) -> Quantity:
-    """Scalar products of vectors of bodies, ``rows`` (m,) ``native.BODY_PRODUCT``."""
-    m = rows.size
-    value, rate, drift = np.empty((3, m))
-    found = Quantity(value, np.empty((m, 6 * motion.n_bodies)), rate, drift)
-    native.body_products(motion, rows, found)
-    return found
 
 
 class FlatRows:

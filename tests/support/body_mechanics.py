@@ -15,7 +15,7 @@ from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
 from catenary.mbs.rigid.bodies import Body, Motion, Vector, normalised
 from catenary.mbs.rigid.forces import BetweenPoints, BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import unit
-from catenary.mbs.rigid.kinematics import Law, difference, point
+from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import null_space
 from catenary.mbs.rigid.system import System
 
@@ -28,12 +28,24 @@ class LineBetween(NamedTuple):
     gradient: np.ndarray
 
 
+def place_of(motion: Motion, body: str, local: Vector) -> tuple[np.ndarray, np.ndarray]:
+    """Place of a point of a body (3,) [m] and its Jacobian (3, 6 n): translations in space axes,
+    then turns in body axes, which move it by their cross products with its place in the body."""
+    i, (x, y, z) = motion.numbers[body], local
+    jacobian = np.zeros((3, 6 * motion.n_bodies + 6))
+    turns = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    jacobian[:, 6 * i : 6 * i + 6] = np.hstack([np.eye(3), motion.rotation[i] @ turns])
+    return motion.position[i] + motion.rotation[i] @ np.asarray(local), jacobian[:, :-6]
+
+
 def line_of(force: BetweenPoints, motion: Motion) -> LineBetween:
     """The line along which a force acts, from the kinematics of its points."""
-    between = difference(point(motion, force.j, force.at_j), point(motion, force.i, force.at_i))
-    length = float(np.linalg.norm(between.value))
-    way = between.value / length
-    return LineBetween(length, float(way @ between.rate), way @ between.jacobian)
+    (start, before), (end, behind) = (
+        place_of(motion, body, at) for body, at in ((force.i, force.at_i), (force.j, force.at_j))
+    )
+    length = float(np.linalg.norm(end - start))
+    gradient = (end - start) / length @ (behind - before)
+    return LineBetween(length, float(gradient @ motion.velocities), gradient)
 
 
 def generalised(force: Force, motion: Motion, time: float = 0.0) -> np.ndarray:
