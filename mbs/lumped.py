@@ -137,7 +137,7 @@ class LumpedPantograph(SteppedHead):
             force += on_frame
             now["head_air"] = on_head
         now["force"] = force
-        if self.added_force:
+        if self.stepped.added_force:
             now["part"] = self._part(time)
         if self._laws.laws:
             now["base"], now["base_velocity"] = self._base_motion(time)

@@ -154,7 +154,8 @@ class SteppedHead(ABC):
         # A start from any other acceleration than what these forces cause loses an order in dt.
         still = self._sprung(self._arrays._replace(newmark=_NO_TIME))
         self._put_drive(0.0)
-        self._step(still, 0.0)
+        if not still.step(self.row):
+            self._refuse(still, 0.0)
         still.advance(np.zeros(len(self.strip_offsets)))
 
     def predict(self, time: float) -> HeadState:
@@ -167,12 +168,12 @@ class SteppedHead(ABC):
         """
         self._aim(time)
         self._put_drive(time)
-        self._step(self.stepped, time)
+        if not self.stepped.step(self.row):
+            self._refuse(self.stepped, time)
         return self.head
 
-    def _step(self, stepped: native.Head, time: float) -> None:
-        """Step a compiled head of these springs without contact to ``time`` [s] by ``row``."""
-        stepped.step(self.row)
+    def _refuse(self, left: native.Head, time: float) -> None:  # noqa: B027  (chains are endless)
+        """Raise RunBroken for a head that has left its heights in a step to ``time`` [s]."""
 
     @abstractmethod
     def _sprung(self, arrays: native.HeadArrays) -> native.Head:

@@ -83,11 +83,10 @@ class RaisingPantograph(SteppedHead):
         mechanism = native.ReducedMechanism(data.frame.tables, data.head.weight, self._zero)
         return native.RaisedHead(arrays, sprung, self._law_arrays, mechanism)
 
-    def _step(self, stepped: native.Head, time: float) -> None:
-        assert isinstance(stepped, native.RaisedHead)
-        # NaN is left to the coupling, which refuses it.
-        if not stepped.step(self.row):
-            raise self._data.frame.left(stepped.height, time)
+    def _refuse(self, left: native.Head, time: float) -> None:
+        # NaN is none: the coupling refuses it.
+        assert isinstance(left, native.RaisedHead)
+        raise self._data.frame.left(left.height, time)
 
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
