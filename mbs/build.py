@@ -96,7 +96,8 @@ def _model(
     from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 
     raising = raising_data(data, pressing, height)
-    raising = raising if operation.rolls else replace(raising, roll=None)
+    if not operation.rolls:
+        raising = replace(raising, head=raising.head._replace(roll=None))
     return RaisingPantograph(raising, stepping, air)
 
 
@@ -146,11 +147,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     Its arm is at the working height when the head, at ``nominal_height`` [m], is pressed down on
     the arm by ``pressing`` [N]: the static force, and what the air lifts the arm with.
     """
-    from catenary.mbs.mechanism.multibody_pantograph import (
-        head_lift,
-        reduced,
-        stand,
-    )
+    from catenary.mbs.mechanism.multibody_pantograph import head_lift, reduced, stand
     from catenary.mbs.mechanism.reduced_pantograph import RaisingData
 
     standing = stand(data)
@@ -162,14 +159,9 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     arm = nominal_height + pressed - head.offset
     return RaisingData(
         frame=reduced(data),
-        head_mass=head.mass,
-        head_stiffness=head.stiffness,
-        head_damping=head.damping,
-        head_weight=head.weight,
-        head_offset=head.offset,
+        head=head,
         base_height=arm - standing.working_height,
         strips=strips,
-        roll=head.roll,
         blown_head=head_lift(data),
         laws=data.laws,
         rest=(nominal_height + strips.compression(pressing), nominal_height + pressed),

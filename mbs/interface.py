@@ -12,6 +12,14 @@ from typing import Protocol
 
 import numpy as np
 
+from catenary.solver.kernels import native
+
+
+def affine(numbers: np.ndarray, n: int) -> native.Affine:
+    """Views of 2 n + 2 n^2 ``numbers``, in which the four stand one after the other."""
+    squares = numbers[2 * n : 2 * n * (1 + n)].reshape(2, n, n)
+    return native.Affine(numbers[:n], numbers[n : 2 * n], squares[0], squares[1])
+
 
 class HeadState:
     """Strips at the end of the coming step as affine functions of the contact forces f (s,) [N].
@@ -20,18 +28,17 @@ class HeadState:
     ``velocity_compliance`` f [m/s]; shapes (s,) and (s, s). Velocities are those of the points
     that touch the wire, also where these move along a tilted strip.
 
-    ``numbers`` (2 s + 2 s^2,) holds these four one after the other; they are its views.
+    ``numbers`` (2 s + 2 s^2,) holds these four one after the other; they are its views, and
+    ``affine`` has them under the names of the line's.
     """
 
     def __init__(self, n_strips: int) -> None:
         self.take(np.zeros(2 * n_strips * (1 + n_strips)), n_strips)
 
     def take(self, numbers: np.ndarray, n_strips: int) -> None:
-        """Take ``numbers`` (2 s + 2 s^2,) of ``n_strips`` strips, s, in place of its own."""
-        s, self.numbers = n_strips, numbers
-        self.height, self.velocity = numbers[:s], numbers[s : 2 * s]
-        self.height_compliance = numbers[2 * s : s * (2 + s)].reshape(s, s)
-        self.velocity_compliance = numbers[s * (2 + s) :].reshape(s, s)
+        """Stand for ``numbers`` (2 s + 2 s^2,) of ``n_strips`` strips, s, in place of its own."""
+        self.numbers, self.affine = numbers, affine(numbers, n_strips)
+        self.height, self.velocity, self.height_compliance, self.velocity_compliance = self.affine
 
 
 class Pantograph(Protocol):

@@ -13,7 +13,6 @@ from catenary.mbs.head.head_arrays import named
 from catenary.mbs.head.laws import LawsInPlace, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.interface import HeadState
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import lifted
 from catenary.solver.kernels import native
@@ -76,9 +75,7 @@ class LumpedPantograph(SteppedHead):
         self._tied, self._started_at = data.tied, self._base_height
         if data.laws:
             self._put_laws(self._in_place(data, pressing, nominal_height))
-            sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
-            arguments = self._arrays, sprung, self._law_arrays, self._carrier
-            self._step_by(native.LawfulChain(*arguments))
+            self._step_by(self._sprung(self._arrays))
         else:
             self._step_by(native.LinearChain(self._arrays, self.linear_step()))
 
@@ -129,22 +126,22 @@ class LumpedPantograph(SteppedHead):
         self._started_at = head_height
         super().place(head_height, velocity)
 
-    def predict(self, time: float) -> HeadState:
-        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""
-        self._aim(time)
+    def _sprung(self, arrays: native.HeadArrays) -> native.Head:
+        sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
+        return native.LawfulChain(arrays, sprung, self._law_arrays, self._carrier)
+
+    def _put_drive(self, time: float) -> None:
         force, now = self._drive(time), self._now
         if self._air is not None:
             on_head, on_frame, _ = self._air.now(time)
             force += on_frame
             now["head_air"] = on_head
         now["force"] = force
-        if self.added_force:
+        if self.stepped.added_force:
             now["part"] = self._part(time)
         if self._laws.laws:
             now["base"], now["base_velocity"] = self._base_motion(time)
             now["roof"], now["roof_velocity"] = lifted(self._base, time)
-        self.stepped.step(self.row)
-        return self.head
 
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in the forces, and where the wire crosses; see `SteppedHead`."""
@@ -210,15 +207,3 @@ class LumpedPantograph(SteppedHead):
             place, velocity = self._base_motion(time)
             force += self._base_stiffness * place + self._base_damping * velocity
         return force
-
-    def _acceleration(self, time: float) -> np.ndarray:
-        force = -self._stiffness @ self.position - self._damping @ self.velocity
-        force[self._carrier] += self._drive(time)
-        if self._air is not None:
-            on_head, on_frame, _ = self._air.now(time)
-            force[self._carrier] += on_frame
-            force += on_head * self._push
-        if self._laws.laws:
-            base, roof = self._base_motion(time), lifted(self._base, time)
-            force += self._laws.pull(self.position, self.velocity, base, roof)
-        return np.asarray(force / self._masses)

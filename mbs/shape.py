@@ -19,6 +19,7 @@ from catenary.base.errors import InputError
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import HOLDER, MultibodyData, stand
 from catenary.mbs.rigid.bodies import SPACE, Motion, rotation_matrix
+from catenary.mbs.rigid.forces import BetweenPoints
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium
 
@@ -155,12 +156,10 @@ class MechanismShape:
             bodies.append(np.full(len(own), numbers[name]))
             kinds.append(np.full(len(cells), HEAD if name == data.head else BODY))
         for force in data.system.forces:
-            ends = getattr(force, "i", None), getattr(force, "j", None)
-            if None in ends:
-                continue
-            parts.append((np.array([force.at_i, force.at_j], dtype=float), np.array([[0, 1]])))  # type: ignore[attr-defined]
-            bodies.append(np.array([numbers[str(name)] for name in ends]))
-            kinds.append(np.array([SPRING]))
+            if isinstance(force, BetweenPoints):
+                parts.append((np.array([force.at_i, force.at_j], dtype=float), np.array([[0, 1]])))
+                bodies.append(np.array([numbers[force.i], numbers[force.j]]))
+                kinds.append(np.array([SPRING]))
         local, self.cells = _joined(parts)
         self._points = _Points(np.concatenate(bodies), local)
         self.kinds = np.concatenate(kinds)

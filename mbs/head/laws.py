@@ -112,32 +112,6 @@ class LawsInPlace:
             self.ways, law, np.array(points, dtype=native.HEAD_LAW_POINT), np.zeros(n_contacts)
         )
 
-    def pull(
-        self,
-        position: np.ndarray,
-        velocity: np.ndarray,
-        base: tuple[float, float],
-        roof: tuple[float, float],
-    ) -> np.ndarray:
-        """Forces on the coordinates (n,), upward [N].
-
-        Parameters
-        ----------
-        position : ndarray, shape (n,)
-            Coordinates [m].
-        velocity : ndarray, shape (n,)
-            Their velocities [m/s].
-        base, roof : tuple of float
-            Height [m] and velocity [m/s] of the base, and of the roof.
-        """
-        total = np.zeros(self.ways.shape[1])
-        heights, rates = self.ways @ position, self.ways @ velocity
-        extensions = heights + self.by_base * base[0] + self.by_roof * roof[0] - self.zero
-        rates += self.by_base * base[1] + self.by_roof * roof[1]
-        for law, way, x, rate in zip(self.laws, self.ways, extensions, rates, strict=True):
-            total -= law.force(float(rate if law.of_rate else x)) * way
-        return total
-
 
 def in_place(
     laws: Sequence[Law], numbers: Sequence[int], n: int, rest: Sequence[float]

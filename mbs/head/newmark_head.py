@@ -17,6 +17,9 @@ from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.interface import HeadState
 from catenary.solver.kernels import native
 
+# A step that takes no time: what it finds are the accelerations of the state as it is.
+_NO_TIME = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 class SteppedHead(ABC):
     """A head's strips on n coordinates, the head's own first, which a step advances together.
@@ -149,11 +152,36 @@ class SteppedHead(ABC):
         self._state[:n] = head_height * self._level
         self._state[n : 2 * n] = velocity * self._level
         # A start from any other acceleration than what these forces cause loses an order in dt.
-        self._state[2 * n :] = self._acceleration(0.0)
+        still = self._sprung(self._arrays._replace(newmark=_NO_TIME))
+        self._put_drive(0.0)
+        if not still.step(self.row):
+            self._refuse(still, 0.0)
+        still.advance(np.zeros(len(self.strip_offsets)))
+
+    def predict(self, time: float) -> HeadState:
+        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
+
+        Raises
+        ------
+        RunBroken
+            A mechanism has left the heights that it can reach.
+        """
+        self._aim(time)
+        self._put_drive(time)
+        if not self.stepped.step(self.row):
+            self._refuse(self.stepped, time)
+        return self.head
+
+    def _refuse(self, left: native.Head, time: float) -> None:  # noqa: B027  (chains are endless)
+        """Raise RunBroken for a head that has left its heights in a step to ``time`` [s]."""
 
     @abstractmethod
-    def _acceleration(self, time: float) -> np.ndarray:
-        """Accelerations (n,) of the present state without contact."""
+    def _sprung(self, arrays: native.HeadArrays) -> native.Head:
+        """A compiled head on its springs and laws, by the factors of Newmark's method in arrays."""
+
+    @abstractmethod
+    def _put_drive(self, time: float) -> None:
+        """Put into ``row`` what a step to ``time`` [s] depends on besides the state and wires."""
 
     @abstractmethod
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:

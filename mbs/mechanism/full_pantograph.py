@@ -19,12 +19,12 @@ from catenary.mbs.head.newmark_head import Raising
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
-from catenary.mbs.rigid.arrays import ORIGIN, body_products
+from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import SPACE, Motion
-from catenary.mbs.rigid.forces import Force, OffLine, PointForce
+from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
-from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.kinematics import body_products, point
 from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
 from catenary.mbs.rigid.step_solvers import StepSolver
@@ -38,7 +38,7 @@ PLACED = 1e-10
 
 
 @dataclass
-class _HoldDown(OffLine):
+class _HoldDown:
     """Hold-down of the arm until the pantograph is raised: ``force`` [N] less and less.
 
     ``part(time)`` of the lift is let act; where it is negative, the arm is pulled down.
@@ -56,7 +56,7 @@ class _HoldDown(OffLine):
 
 
 @dataclass(frozen=True)
-class _Carried(OffLine):
+class _Carried:
     """Inertia forces on bodies over a base that is accelerated up and sideways."""
 
     name: str
@@ -72,11 +72,11 @@ class _Carried(OffLine):
 
 
 @dataclass(frozen=True)
-class _Blown(OffLine):
+class _Blown:
     """A ``force`` of the air as it acts at a time: times ``column`` of the numbers of ``air``."""
 
     name: str
-    force: Force
+    force: PointForce
     air: AirForces
     column: int
 

@@ -21,7 +21,7 @@ from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning
 from catenary.mbs.mechanism.reduction import Places, ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Motion
-from catenary.mbs.rigid.forces import Characteristic, Force, Gravity, PointForce, SpringDamper
+from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper, gradient_of
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.least_squares import least_squares
 from catenary.mbs.rigid.statics import (
@@ -49,8 +49,8 @@ ADRIFT = 0.01
 MOST_FORCE = 1e7
 # The joint that holds the arm in what is computed here.
 HOLDER = "height of the arm"
-# Travel [m] and speed [m/s] over which characteristics are measured.
-_TRAVEL, _SPEED = 1e-3, 1e-3
+# Travel over which slopes of springs are measured [m].
+_TRAVEL = 1e-3
 # Part of a unit turn that joints may miss where they allow it.
 _MISSED = 1e-6
 # About the track and across it.
@@ -117,8 +117,8 @@ class Head(NamedTuple):
     damping: float
     weight: float
     offset: float
-    roll: Turning | None
-    pitch: Turning | None
+    roll: Turning | None = None
+    pitch: Turning | None = None
 
 
 class Standing(NamedTuple):
@@ -392,7 +392,7 @@ def _head(data: MultibodyData, system: System, holder: Joint, motion: Motion) ->
         ) from error
     stiffness = -float(np.polyfit(around - rest, tables.lifts, 1)[0])
     # Forces on the head alone: its weight, and forces at its points.
-    own = [force for force in held.forces if data.arm not in _joined(force)]
+    own = [force for force in held.other_forces if data.arm not in _joined(force)]
     pull = float(np.sum([f.generalised(motion, 0.0)[6 * number + 2] for f in own]))
     return Head(
         mass=float(tables.masses[2]),
@@ -513,14 +513,9 @@ def _turning(data: MultibodyData, system: System, motion: Motion, about: int) ->
     stiffness = damping = 0.0
     for force in system.forces:
         if isinstance(force, SpringDamper) and data.head in (force.i, force.j):
-            stretch = float(force.line(motion).gradient[own] @ way)
-            stiffness += _slope(force.stiffness, _TRAVEL) * stretch**2
-            damping += _slope(force.damping, _SPEED) * stretch**2
+            stretch, slope = float(gradient_of(force, motion)[own] @ way), force.stiffness
+            if callable(slope):
+                slope = (slope(_TRAVEL) - slope(-_TRAVEL)) / (2.0 * _TRAVEL)
+            stiffness += slope * stretch**2
+            damping += force.damping * stretch**2
     return Turning(float(system.mass[own] @ way**2), stiffness, damping)
-
-
-def _slope(characteristic: Characteristic, step: float) -> float:
-    """Slope of a spring's or damper's characteristic around zero."""
-    if not callable(characteristic):
-        return characteristic
-    return (characteristic(step) - characteristic(-step)) / (2.0 * step)

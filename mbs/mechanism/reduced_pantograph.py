@@ -20,12 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.mbs.air import SQUARE, AirForces
-from catenary.mbs.head.head_arrays import named, tables_at
+from catenary.mbs.head.head_arrays import named
 from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.newmark_head import SteppedHead, parts_of
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning, head_parts
-from catenary.mbs.interface import HeadState
+from catenary.mbs.head.strips import ONE_STRIP, Strips, head_parts
+from catenary.mbs.mechanism.multibody_pantograph import Head
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.vehicle.base_motion import lifted
 from catenary.solver.kernels import native
@@ -35,24 +35,17 @@ from catenary.solver.kernels import native
 class RaisingData:
     """A head on a mechanism.
 
-    ``frame``: mass, lift and damping over the arm's height above the base; ``head_mass`` [kg],
-    ``head_stiffness`` [N/m] and ``head_damping`` [N s/m] between head and arm; ``head_weight`` [N];
-    ``head_offset`` [m], height of the head above the arm at rest without contact; ``base_height``
-    [m] of the base, in the line's heights. ``strips`` are part of the head, which may turn about
-    the track as ``roll`` says. ``blown_head`` [N] is what the air on bodies lifts the head by,
-    where it meets them as the frame's tables have it. ``laws`` that are not linear act on head and
-    arm besides; both are at the heights ``rest`` [m] where the static force holds.
+    ``frame``: mass, lift and damping over the arm's height above the base; ``base_height`` [m] of
+    the base, in the line's heights. ``strips`` are part of the head. ``blown_head`` [N] is what the
+    air on bodies lifts the head by, where it meets them as the frame's tables have it. ``laws``
+    that are not linear act on head and arm besides; both are at the heights ``rest`` [m] where the
+    static force holds.
     """
 
     frame: ReducedMechanism
-    head_mass: float
-    head_stiffness: float
-    head_damping: float
-    head_weight: float
-    head_offset: float
+    head: Head
     base_height: float = 0.0
     strips: Strips = ONE_STRIP
-    roll: Turning | None = None
     blown_head: float = 0.0
     laws: tuple[Law, ...] = ()
     rest: tuple[float, float] = (0.0, 0.0)
@@ -72,36 +65,28 @@ class RaisingPantograph(SteppedHead):
     """
 
     def __init__(self, data: RaisingData, stepping: Stepping, air: AirForces | None = None) -> None:
-        values = data.head_mass, data.head_stiffness, data.head_damping
-        head = head_parts(*values, data.strips, data.roll if stepping.lateral is not None else None)
+        roll = data.head.roll if stepping.lateral is not None else None
+        head = head_parts(*data.head[:3], data.strips, roll)
         super().__init__(head, head.n + 1, stepping)
         self._data = data
         self._air = air
-        self._zero = data.head_offset + data.base_height
-        self._masses = np.append(head.masses, 0.0)
-        self._stiffness, self._damping = head.stiffness, head.damping
-        self._tables = data.frame.tables
+        self._zero = data.head.offset + data.base_height
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
+        self._masses = np.append(head.masses, 0.0)
+        self._stiffness, self._damping = head.stiffness, head.damping
+        self._step_by(self._sprung(self._arrays))
+
+    def _sprung(self, arrays: native.HeadArrays) -> native.RaisedHead:
+        data = self._data
         sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
-        mechanism = native.ReducedMechanism(self._tables, data.head_weight, self._zero)
-        self._raised = native.RaisedHead(self._arrays, sprung, self._law_arrays, mechanism)
-        self._step_by(self._raised)
+        mechanism = native.ReducedMechanism(data.frame.tables, data.head.weight, self._zero)
+        return native.RaisedHead(arrays, sprung, self._law_arrays, mechanism)
 
-    def predict(self, time: float) -> HeadState:
-        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
-
-        Raises
-        ------
-        RunBroken
-            The mechanism has left the heights that it can reach.
-        """
-        self._aim(time)
-        self._move_base(time)
-        # NaN is left to the coupling, which refuses it.
-        if not self._raised.step(self.row):
-            raise self._data.frame.left(self._raised.height, time)
-        return self.head
+    def _refuse(self, left: native.Head, time: float) -> None:
+        # NaN is none: the coupling refuses it.
+        assert isinstance(left, native.RaisedHead)
+        raise self._data.frame.left(left.height, time)
 
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
@@ -120,8 +105,7 @@ class RaisingPantograph(SteppedHead):
         """Height of the base at ``time`` [s], in the line's heights [m]."""
         return self._data.base_height + lifted(self._base, time)[0]
 
-    def _move_base(self, time: float) -> None:
-        """Put lift and base to ``time`` [s]."""
+    def _put_drive(self, time: float) -> None:
         now = self._now
         now["part"] = self._part(time)
         if self._base is not None:
@@ -137,30 +121,3 @@ class RaisingPantograph(SteppedHead):
         blown = forces.copy()
         blown[..., 0] += self._data.blown_head * forces[..., SQUARE]
         return blown
-
-    def _acceleration(self, time: float) -> np.ndarray:
-        self._move_base(time)
-        now = self._now[()]
-        (mass, lift, slowing, carried, *blown), (mass_slope, *_) = self._columns_at(
-            self.position[-1] - self._zero - now["base"]
-        )
-        speed = self.velocity[-1] - now["base_velocity"]
-        force = -self._stiffness @ self.position - self._damping @ self.velocity
-        lifting = now["part"] * (lift - self._data.head_weight)
-        force[-1] += lifting - slowing * speed - 0.5 * mass_slope * speed**2
-        force[-1] += (mass - carried) * now["base_acceleration"]
-        force += now["head_air"] * self._push
-        force[-1] += now["arm_air"] + now["bodies_air"] * sum(blown)
-        if self._laws.laws:
-            base = float(now["base"]), float(now["base_velocity"])
-            force += self._laws.pull(self.position, self.velocity, base, base)
-        masses = self._masses.copy()
-        masses[-1] = mass
-        return np.asarray(force / masses)
-
-    def _columns_at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
-        """All columns of the mechanism's tables and their slopes at a height above the base [m]."""
-        breaks = self._tables.breaks
-        if not breaks[0] <= height <= breaks[-1]:
-            raise self._data.frame.left(height)
-        return tables_at(self._tables, height)

@@ -19,7 +19,7 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.head_arrays import spline_tables, tables_at
 from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.mbs.rigid.forces import Actuator, Force, PointForce
+from catenary.mbs.rigid.forces import Actuator, PointForce, gradient_of
 from catenary.mbs.rigid.joints import PrescribedPoint
 from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import least_squares, null_space
@@ -73,14 +73,13 @@ class ReducedMechanism:
         """Upward force on the point by the air on the bodies at a height [m], 0 without air."""
         return 0.0 if self.blown is None else float(CubicSpline(self.heights, self.blown)(height))
 
-    def left(self, height: float, time: float | None = None) -> RunBroken:
+    def left(self, height: float, time: float) -> RunBroken:
         """The error of a mechanism that has left its tables at a height [m] and a time [s]."""
         who = f"of pantograph {self.name!r} " if self.name else ""
-        begin = "The" if time is None else f"At {time:.4g} s the"
         return RunBroken(
-            f"{begin} arm {who}is at {height:.4g} m above its base, but its mechanism moves "
-            f"between {self.heights[0]:.4g} m and {self.heights[-1]:.4g} m only: it was thrown "
-            "off the wire, or the line's heights are beyond its reach; take a smaller "
+            f"At {time:.4g} s the arm {who}is at {height:.4g} m above its base, but its mechanism "
+            f"moves between {self.heights[0]:.4g} m and {self.heights[-1]:.4g} m only: it was "
+            "thrown off the wire, or the line's heights are beyond its reach; take a smaller "
             "numerics.dt_s or a mechanism that reaches"
         )
 
@@ -94,13 +93,13 @@ def reduce_mechanism(
     as_far_as_it_goes: bool = False,
     tolerance: float | None = None,
     name: str = "",
-    blowing: Sequence[Force] = (),
+    blowing: Sequence[PointForce] = (),
     places: Places | None = None,
     riding: tuple[float, Vector] = (0.0, ORIGIN),
 ) -> ReducedMechanism:
     """Tables of a mechanism for heights of the point ``at`` of a body.
 
-    Forces must not depend on time, and dampers be linear. What moves besides the raising (links
+    Forces must not depend on time. What moves besides the raising (links
     that spin between two balls) is taken to stay at rest, as it does in a plane mechanism.
 
     Parameters
@@ -123,7 +122,7 @@ def reduce_mechanism(
         in, down to half a millimetre; None for the given heights alone.
     name : str, optional
         Name of the pantograph, for messages.
-    blowing : sequence of Force, optional
+    blowing : sequence of PointForce, optional
         Forces of the air, of which the tables have a column of their own.
     places : Places, optional
         Places that earlier calls have found for the same ``body`` and ``at`` and a system
@@ -204,12 +203,7 @@ class Places:
         assert actuator is None or isinstance(actuator, Actuator)
         if self._raised is None:
             self._raised = _Raised(system, body, at, actuator)
-        return self._raised, 0.0 if actuator is None else _push(actuator) - self._raised.push
-
-
-def _push(actuator: Actuator) -> float:
-    assert not callable(actuator.force)
-    return actuator.force
+        return self._raised, 0.0 if actuator is None else actuator.force - self._raised.push
 
 
 class _Place(NamedTuple):
@@ -237,7 +231,7 @@ class _Raised:
         self._held = system.with_joints(PrescribedPoint("height", body, self._law, at))
         self._places: dict[float, _Place] = {}
         self._gains: dict[float, float] = {}
-        self._actuator, self.push = actuator, 0.0 if actuator is None else _push(actuator)
+        self._actuator, self.push = actuator, 0.0 if actuator is None else actuator.force
 
     def assembled(self, start: Motion | None) -> Motion:
         """A motion that joints allow, near by, or near the data's if None."""
@@ -258,7 +252,7 @@ class _Raised:
     def _gain(self, place: _Place) -> float:
         """Upward force at a place per force of the actuator."""
         assert self._actuator is not None
-        pull = self._actuator.line(place.motion).gradient
+        pull = gradient_of(self._actuator, place.motion)
         self._height = place.height
         free = null_space(self._held.constraints(place.motion, 0.0).jacobian)
         if np.abs(free.T @ pull).max(initial=0.0) > _NO_WORK * np.abs(pull).max():

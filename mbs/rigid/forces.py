@@ -1,32 +1,25 @@
 """Forces on bodies: springs and dampers with tables, actuators, gravity, bump stops, point forces.
 
-Each force gives its generalised forces (6 n,): three forces [N] in space axes and three moments
-[N m] in body axes a body.
+Generalised forces (6 n,) are three forces [N] in space axes and three moments [N m] in body axes a
+body. Kernels evaluate all forces between points at once.
 
 Source: P. E. Nikravesh, Computer-aided analysis of mechanical systems, 1988, chapters 10 and 11.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from catenary.base.errors import InputError
-from catenary.mbs.rigid.arrays import ORIGIN, Line, LineForce
+from catenary.mbs.rigid.arrays import ORIGIN, vectors
 from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.mbs.rigid.kinematics import difference, point
-
-
-class Force(LineForce, Protocol):
-    """Interface of a force to a system of bodies."""
-
-    def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces at ``time`` [s], shape (6 n,) [N, N m]."""
+from catenary.mbs.rigid.kinematics import number_of, point
+from catenary.solver.kernels import native
 
 
 class Table:
@@ -57,25 +50,17 @@ class Table:
         return float(self._line(x))
 
 
-# A characteristic: a constant slope, or a force as a function (a `Table`, for instance).
+# A constant slope, or a force as a function (a `Table`, for instance).
 Characteristic = float | Callable[[float], float]
 
 
-def _force_of(characteristic: Characteristic, x: float) -> float:
-    return characteristic(x) if callable(characteristic) else characteristic * x
-
-
-class _Line(NamedTuple):
-    """The line between points of two bodies: its length [m], its rate [m/s], d length / d q."""
-
-    length: float
-    rate: float
-    gradient: np.ndarray
-
-
 @dataclass(frozen=True)
-class _BetweenPoints(ABC):
-    """Something that acts along the line between a point of body i and a point of body j."""
+class BetweenPoints:
+    """A force along the line between a point of body i and a point of body j.
+
+    It pulls them together by k (length - free length) + c d length / dt + preload, and by what
+    ``pull`` says of the length [m], if it is a function [N].
+    """
 
     name: str
     i: str
@@ -83,114 +68,88 @@ class _BetweenPoints(ABC):
     at_i: Vector = ORIGIN
     at_j: Vector = ORIGIN
 
-    def line(self, motion: Motion) -> _Line:
-        """Length, rate of length and gradient of length (6 n,)."""
-        between = difference(point(motion, self.j, self.at_j), point(motion, self.i, self.at_i))
-        length = float(np.linalg.norm(between.value))
-        if length == 0.0:
-            raise InputError(f"Force {self.name!r}: its two points coincide, it has no direction.")
-        way = between.value / length
-        return _Line(length, float(way @ between.rate), way @ between.jacobian)
+    @property
+    def linear(self) -> tuple[float, float, float, float]:
+        """k [N/m], free length [m], c [N s/m], preload [N]."""
+        return 0.0, 0.0, 0.0, 0.0
 
-    @abstractmethod
-    def pull_at(self, length: float, rate: float, time: float) -> float:
-        """Force [N] that pulls the points together, at a length [m], its rate [m/s] and a time."""
-
-    def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
-        line = self.line(motion)
-        return -self.pull_at(line.length, line.rate, time) * line.gradient
-
-    def _line(self, **what: Any) -> Line:
-        return Line(self.i, self.at_i, self.j, self.at_j, **what)
+    @property
+    def pull(self) -> Callable[[float], float] | None:
+        """Pull [N] at a length [m] besides, None without."""
+        return None
 
 
 @dataclass(frozen=True)
-class SpringDamper(_BetweenPoints):
+class SpringDamper(BetweenPoints):
     """A spring and a damper side by side between two points.
 
     ``stiffness`` [N/m], or a function (a `Table`) of the extension [m] that gives the pull [N];
-    ``free_length`` [m]; ``damping`` [N s/m], or a function of the rate of extension [m/s].
+    ``free_length`` [m]; ``damping`` [N s/m].
     """
 
     stiffness: Characteristic = 0.0
     free_length: float = 0.0
-    damping: Characteristic = 0.0
+    damping: float = 0.0
 
-    def pull_at(self, length: float, rate: float, time: float) -> float:
-        """The pull [N] at a length [m] and its rate [m/s]."""
-        elastic = _force_of(self.stiffness, length - self.free_length)
-        return elastic + _force_of(self.damping, rate)
+    @property
+    def linear(self) -> tuple[float, float, float, float]:
+        """Its constants, but for a stiffness that is a function."""
+        stiffness = 0.0 if callable(self.stiffness) else self.stiffness
+        return stiffness, self.free_length, self.damping, 0.0
 
-    def on_line(self) -> Line:
-        """Constants, or the pull if one of them is a function."""
-        if callable(self.stiffness) or callable(self.damping):
-            return self._line(pull=self.pull_at)
-        return self._line(
-            stiffness=self.stiffness, free_length=self.free_length, damping=self.damping
-        )
-
-
-@dataclass(frozen=True)
-class Actuator(_BetweenPoints):
-    """Pushes two points apart with a given force.
-
-    ``force`` [N], > 0 pushing apart: a number, or a function (a `Table`) of time [s].
-    """
-
-    force: float | Callable[[float], float] = 0.0
-
-    def pull_at(self, length: float, rate: float, time: float) -> float:
-        """Minus its push [N]."""
-        return -(self.force(time) if callable(self.force) else self.force)
-
-    def on_line(self) -> Line:
-        """A constant, or the pull if the force is a function."""
-        if callable(self.force):
-            return self._line(pull=self.pull_at)
-        return self._line(preload=-self.force)
+    @property
+    def pull(self) -> Callable[[float], float] | None:
+        """That function of the extension, over the length."""
+        law, free = self.stiffness, self.free_length
+        return (lambda length: law(length - free)) if callable(law) else None
 
 
 @dataclass(frozen=True)
-class BumpStop(_BetweenPoints):
-    """Keeps the distance of two points between two limits, by a spring and a damper that push only.
+class Actuator(BetweenPoints):
+    """Pushes two points apart with a given ``force`` [N]."""
 
-    ``shortest``, ``longest`` [m]; ``stiffness`` [N/m], ``damping`` [N s/m] of each stop.
+    force: float = 0.0
+
+    @property
+    def linear(self) -> tuple[float, float, float, float]:
+        """Minus its push."""
+        return 0.0, 0.0, 0.0, -self.force
+
+
+@dataclass(frozen=True)
+class BumpStop(BetweenPoints):
+    """Keeps the distance of two points between two limits, by springs that push only.
+
+    ``shortest``, ``longest`` [m]; ``stiffness`` [N/m] of each stop.
     """
 
     shortest: float = 0.0
     longest: float = np.inf
     stiffness: float = 0.0
-    damping: float = 0.0
 
-    def _depth(self, length: float) -> tuple[float, float]:
-        """Depth beyond a limit [m], and the sign of the way back in length."""
-        if length < self.shortest:
-            return self.shortest - length, 1.0
-        return max(length - self.longest, 0.0), -1.0
-
-    def pull_at(self, length: float, rate: float, time: float) -> float:
-        """The pull [N] at a length [m] and its rate [m/s]."""
-        depth, way_back = self._depth(length)
-        if depth == 0.0:
-            return 0.0
-        # A stop does not hold back what is leaving it.
-        return -way_back * max(self.stiffness * depth - way_back * self.damping * rate, 0.0)
-
-    def on_line(self) -> Line:
-        """Its pull."""
-        return self._line(pull=self.pull_at)
+    @property
+    def pull(self) -> Callable[[float], float]:
+        """Pull of the stop that is met."""
+        return lambda length: (
+            self.stiffness * (max(length - self.longest, 0.0) - max(self.shortest - length, 0.0))
+        )
 
 
-class OffLine:
-    """A force that does not act along a line between two points."""
+class OffLine(Protocol):
+    """Interface of a force that does not act along a line between two points."""
 
-    def on_line(self) -> None:
-        """None."""
+    @property
+    def name(self) -> str: ...
+
+    def generalised(self, motion: Motion, time: float) -> np.ndarray:
+        """Generalised forces at ``time`` [s], shape (6 n,) [N, N m]."""
+
+
+Force = BetweenPoints | OffLine
 
 
 @dataclass(frozen=True)
-class PointForce(OffLine):
+class PointForce:
     """A force on a point of a body, its direction fixed in space.
 
     ``force`` (3,) [N], or a function of time [s] that gives it.
@@ -208,7 +167,7 @@ class PointForce(OffLine):
 
 
 @dataclass(frozen=True)
-class Gravity(OffLine):
+class Gravity:
     """Weight of all bodies, downward.
 
     ``masses`` (n,) [kg] in the order of the bodies; ``acceleration`` [m/s^2].
@@ -227,3 +186,82 @@ class Gravity(OffLine):
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
         """Generalised forces (6 n,)."""
         return self._forces.copy()
+
+
+# Differences of length for slopes of pulls that are given as functions [m].
+LENGTH_STEP = 1e-7
+
+
+class LineGeometry(NamedTuple):
+    """Lengths (m,) of lines [m], their rates (m,) [m/s] and gradients (m, 6 n)."""
+
+    length: np.ndarray
+    rate: np.ndarray
+    gradient: np.ndarray
+
+
+class FlatLines:
+    """Forces between points, evaluated together by kernels.
+
+    Attributes
+    ----------
+    names : (m,) of them in their order
+    damping : (m,) of them [N s/m]
+
+    Parameters
+    ----------
+    forces : of which those between points are taken
+    start : any motion of the system, for the bodies' numbers
+
+    Raises
+    ------
+    InputError
+        A force names a body that there is not.
+    """
+
+    def __init__(self, forces: Sequence[Force], start: Motion) -> None:
+        lines = [force for force in forces if isinstance(force, BetweenPoints)]
+        self.names = tuple(force.name for force in lines)
+        self._rows = np.zeros(len(lines), dtype=native.BODY_LINE)
+        self._rows["i"] = [number_of(start, force.i) for force in lines]
+        self._rows["j"] = [number_of(start, force.j) for force in lines]
+        self._rows["at_i"] = vectors([force.at_i for force in lines])
+        self._rows["at_j"] = vectors([force.at_j for force in lines])
+        constants = np.array([force.linear for force in lines], dtype=float).reshape(-1, 4)
+        self._stiffness, self._free, self.damping, self._preload = constants.T.copy()
+        self._pulls = [(k, force.pull) for k, force in enumerate(lines) if force.pull]
+
+    def geometry(self, motion: Motion) -> LineGeometry:
+        """Geometry of the lines in a motion.
+
+        Raises InputError where the two points of a line coincide.
+        """
+        m = self._rows.size
+        length, rate = np.empty((2, m))
+        found = LineGeometry(length, rate, np.empty((m, 6 * motion.n_bodies)))
+        native.body_lines(motion, self._rows, found)
+        if not length.all():
+            name = self.names[int(np.argmin(length))]
+            raise InputError(f"Force {name!r}: its two points coincide, it has no direction.")
+        return found
+
+    def pulls(self, length: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Pulls (m,) [N] at lengths [m] and rates [m/s] (m,)."""
+        result = self._stiffness * (length - self._free) + self.damping * rate + self._preload
+        for k, pull in self._pulls:
+            result[k] += pull(float(length[k]))
+        return result
+
+    def stiffness(self, length: np.ndarray) -> np.ndarray:
+        """Slopes of the pulls (m,) at lengths (m,) [N/m]."""
+        result = self._stiffness.copy()
+        for k, pull in self._pulls:
+            ahead, behind = (pull(float(length[k]) + step) for step in (LENGTH_STEP, -LENGTH_STEP))
+            result[k] = (ahead - behind) / (2.0 * LENGTH_STEP)
+        return result
+
+
+def gradient_of(force: BetweenPoints, motion: Motion) -> np.ndarray:
+    """Gradient (6 n,) of the length of a force's line."""
+    found: np.ndarray = FlatLines([force], motion).geometry(motion).gradient[0]
+    return found

@@ -206,10 +206,10 @@ class Stepper:
         moved = moved + h * sped + 0.5 * h**2 * pushed
         sped = sped + h * pushed
         rows, ways = system.constraints(there, end), self._ways(there)
-        length, rate, gradient = system.lines.geometry(there)
-        stiffness, damping = system.lines.slopes(length, rate, end)
+        length, _, gradient = system.lines.geometry(there)
         # Negative slopes are left to the prediction, so that A stays positive.
-        stiffness, damping = np.maximum(stiffness, 0.0), np.maximum(damping, 0.0)
+        stiffness = np.maximum(system.lines.stiffness(length), 0.0)
+        damping = np.maximum(system.lines.damping, 0.0)
         mass = system.mass
         operator = (gradient.T * (gamma * h * damping + beta * h**2 * stiffness)) @ gradient
         operator[np.diag_indices(len(mass))] += mass

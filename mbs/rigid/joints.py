@@ -19,7 +19,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
-from catenary.mbs.rigid.arrays import ORIGIN, Product, TimeLaw
+from catenary.mbs.rigid.arrays import ORIGIN, MadeRows, Product, TimeLaw
 from catenary.mbs.rigid.bodies import SPACE, Vector, rotation_matrix
 from catenary.mbs.rigid.kinematics import (
     Law,
@@ -28,9 +28,7 @@ from catenary.mbs.rigid.kinematics import (
     cross,
     difference,
     part_of,
-    scaled,
     stacked,
-    total,
 )
 
 AXES = np.eye(3)
@@ -97,18 +95,8 @@ def across_axis(i: str, normals: Sequence[Vector], j: str, axis: Vector) -> list
     return [Product(i, normal, j, axis) for normal in normals]
 
 
-class _RowsAreProducts:
-    """A joint each row of which is one scalar product."""
-
-    n_rows: ClassVar[int | None] = None
-
-    def rows(self, products: Quantity, time: float) -> Quantity:
-        """Phi with its derivatives."""
-        return products
-
-
 @dataclass(frozen=True)
-class _BetweenPoints(_RowsAreProducts):
+class _BetweenPoints:
     """A joint between a point ``at_i`` of body ``i`` and a point ``at_j`` of body ``j``."""
 
     name: str
@@ -204,7 +192,7 @@ class RevolutePrismatic(_BetweenPoints):
 
 
 @dataclass(frozen=True)
-class Fixed(_RowsAreProducts):
+class Fixed:
     """Body j is held by body i, or in space: six rows.
 
     ``parameters`` are the unit Euler parameters (4,) of body j as seen from body i.
@@ -228,7 +216,7 @@ class Fixed(_RowsAreProducts):
 
 
 @dataclass(frozen=True)
-class PointOnCurve:
+class PointOnCurve(MadeRows):
     """A point of a body stays on a curve y(x), z(x) in space: two rows.
 
     ``x``, ``y``, ``z`` are points of the curve, shape (n,) [m], n >= 2, joined by natural cubic
@@ -266,7 +254,7 @@ class PointOnCurve:
 
 
 @dataclass(frozen=True)
-class PrescribedPoint(_RowsAreProducts):
+class PrescribedPoint:
     """A point of a body has a prescribed coordinate along a direction in space: one row.
 
     The coordinate [m] is measured from the origin; ``along`` need not have length one.
@@ -286,7 +274,7 @@ class PrescribedPoint(_RowsAreProducts):
 
 @dataclass(frozen=True)
 class PrescribedAngle:
-    """Body j is turned by a prescribed angle [rad] about an axis of body i: one row.
+    """Body j is turned by a prescribed ``angle`` [rad] about an axis of body i: one row.
 
     At the angle zero ``normal_j`` points along ``normal_i``; both are across the axis. Whatever
     else keeps the axis in place is up to other joints.
@@ -295,33 +283,15 @@ class PrescribedAngle:
     name: str
     i: str
     j: str
-    law: TimeLaw
+    angle: float
     axis_i: Vector = (0.0, 1.0, 0.0)
     normal_i: Vector = (1.0, 0.0, 0.0)
     normal_j: Vector = (1.0, 0.0, 0.0)
     n_lengths: ClassVar[int] = 0
 
-    @property
-    def n_rows(self) -> int | None:
-        """One row, which is a product where the angle is constant."""
-        return None if isinstance(self.law, Constant) else 1
-
     def products(self) -> list[Product]:
-        """The turned normal across ``normal_i``; its components if the angle changes."""
+        """The turned normal across ``normal_i``."""
         forward = unit(self.normal_i)
-        normals = [cross(unit(self.axis_i), forward), forward]
-        if isinstance(self.law, Constant):
-            angle = self.law.number
-            normals = [np.cos(angle) * normals[0] - np.sin(angle) * normals[1]]
-        return across_axis(self.i, normals, self.j, unit(self.normal_j))
-
-    def rows(self, products: Quantity, time: float) -> Quantity:
-        """Phi with its derivatives: cos(angle) of the first less sin(angle) of the second."""
-        if isinstance(self.law, Constant):
-            return products
-        angle, rate, acceleration = self.law(time)
-        sine, cosine = np.sin(angle), np.cos(angle)
-        by_side = Law(cosine, -sine * rate, -cosine * rate**2 - sine * acceleration)
-        by_forward = Law(-sine, -cosine * rate, sine * rate**2 - cosine * acceleration)
-        side, forward = part_of(products, slice(0, 1)), part_of(products, slice(1, 2))
-        return total(scaled(side, by_side), scaled(forward, by_forward))
+        side = cross(unit(self.axis_i), forward)
+        normal = np.cos(self.angle) * side - np.sin(self.angle) * forward
+        return across_axis(self.i, [normal], self.j, unit(self.normal_j))

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.rigid.bodies import SPACE, Motion, Vector
+from catenary.solver.kernels import native
 
 
 class Quantity(NamedTuple):
@@ -35,12 +36,6 @@ class Law(NamedTuple):
     second: float
 
 
-def cross_matrix(vector: np.ndarray) -> np.ndarray:
-    """Matrix (3, 3) that makes ``vector`` x b of b."""
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """a x b of two vectors (3,): what numpy's does, in a tenth of its time."""
     (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
@@ -54,41 +49,27 @@ def number_of(motion: Motion, body: str) -> int:
     return motion.numbers[body]
 
 
+def body_products(motion: Motion, rows: np.ndarray) -> Quantity:
+    """Scalar products of vectors of bodies, ``rows`` (m,) ``native.BODY_PRODUCT``."""
+    m = rows.size
+    value, rate, drift = np.empty((3, m))
+    found = Quantity(value, np.empty((m, 6 * motion.n_bodies)), rate, drift)
+    native.body_products(motion, rows, found)
+    return found
+
+
 def point(motion: Motion, body: str, local: Vector) -> Quantity:
     """A point of a ``body``, at ``local`` in its axes [m], in space."""
-    i = number_of(motion, body)
-    fixed = np.asarray(local, dtype=float)
-    rotation, spin = motion.rotation[i], motion.spin[i]
-    turning = cross(spin, fixed)
-    jacobian = np.zeros((3, 6 * motion.n_bodies + 6))
-    jacobian[:, 6 * i : 6 * i + 3] = np.eye(3)
-    jacobian[:, 6 * i + 3 : 6 * i + 6] = -rotation @ cross_matrix(fixed)
-    return Quantity(
-        motion.position[i] + rotation @ fixed,
-        jacobian[:, :-6],
-        motion.velocity[i] + rotation @ turning,
-        rotation @ cross(spin, turning),
-    )
+    rows = np.zeros(3, dtype=native.BODY_PRODUCT)
+    rows["body"] = rows["start"] = motion.numbers[SPACE]
+    rows["end"], rows["at_end"] = number_of(motion, body), local
+    rows["normal"], rows["between"] = np.eye(3), True
+    return body_products(motion, rows)
 
 
 def difference(a: Quantity, b: Quantity) -> Quantity:
     """a - b."""
     return Quantity(*(x - y for x, y in zip(a, b, strict=True)))
-
-
-def total(a: Quantity, b: Quantity) -> Quantity:
-    """a + b."""
-    return Quantity(*(x + y for x, y in zip(a, b, strict=True)))
-
-
-def scaled(a: Quantity, by: Law) -> Quantity:
-    """c(t) a for a given number c, ``by``, with its time derivatives."""
-    return Quantity(
-        by.value * a.value,
-        by.value * a.jacobian,
-        by.value * a.rate + by.first * a.value,
-        by.value * a.drift + 2.0 * by.first * a.rate + by.second * a.value,
-    )
 
 
 def applied_to(a: Quantity, f: Law) -> Quantity:

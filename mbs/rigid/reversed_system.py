@@ -15,7 +15,7 @@ import numpy as np
 
 from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import SPACE, Body, Vector
-from catenary.mbs.rigid.forces import Force, PointForce
+from catenary.mbs.rigid.forces import BetweenPoints, Force
 from catenary.mbs.rigid.joints import Fixed, PointOnCurve, PrescribedPoint
 from catenary.mbs.rigid.system import System
 
@@ -61,9 +61,7 @@ def _joint(joint: Joint) -> Joint:
 
 
 def _force(force: Force) -> Force:
-    if isinstance(force, PointForce) or not hasattr(force, "i"):
-        return force
-    return replace(force, **_in_space(force))  # type: ignore[type-var]
+    return replace(force, **_in_space(force)) if isinstance(force, BetweenPoints) else force
 
 
 def _in_space(what: Any) -> dict[str, Any]:

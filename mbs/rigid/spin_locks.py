@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.mbs.rigid.bodies import SPACE, Body, Motion
-from catenary.mbs.rigid.joints import Constant, PrescribedAngle, Spherical
+from catenary.mbs.rigid.joints import PrescribedAngle, Spherical
 from catenary.mbs.rigid.system import System
 
 _ACROSS, _ALONG = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
@@ -69,7 +69,7 @@ def _holder(system: System, body: Body, motion: Motion) -> PrescribedAngle | Non
         f"no spin of {body.name}",
         SPACE,
         body.name,
-        Constant(0.0),
+        0.0,
         axis_i=tuple(axis),
         normal_i=tuple(normal),
         normal_j=tuple(rotation.T @ side),

@@ -156,7 +156,7 @@ def calibrate_actuator(
     held : System
         Bodies with their forces and joints, the last of which, of one row, holds them.
     actuator : str
-        Name of the actuator, whose force is constant.
+        Name of the actuator.
     start : Motion
         Motion near the equilibrium.
     static_force : float
@@ -170,8 +170,8 @@ def calibrate_actuator(
         The actuator does not act on what the holder holds.
     """
     before = held.force(actuator)
-    if not isinstance(before, Actuator) or callable(before.force):
-        raise InputError(f"Force {actuator!r} is no actuator with a constant force.")
+    if not isinstance(before, Actuator):
+        raise InputError(f"Force {actuator!r} is no actuator.")
 
     def pressed(push: float, start: Motion) -> tuple[float, Motion]:
         return _pressed(held.with_force_changed(actuator, force=push), start)

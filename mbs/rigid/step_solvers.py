@@ -113,7 +113,30 @@ class Partitioned:
         return linalg.lapack.dgetrs(self._triangles, self._order, values)[0].reshape(values.shape)
 
 
-class Augmented:
+class _Multipliers:
+    """Changes by A alone, and multipliers of rows by their Schur complement."""
+
+    def _factor_rows(self, operator: np.ndarray, rows: np.ndarray, softness: float = 0.0) -> None:
+        """Prepare for A and rows (m, 6 n) of J, whose Schur complement has a diagonal larger by the
+        part ``softness``."""
+        self._rows = rows
+        self._operator = linalg.cho_factor(operator, check_finite=False)
+        self._soft = linalg.cho_solve(self._operator, rows.T, check_finite=False)
+        schur = rows @ self._soft
+        if len(schur):
+            schur[np.diag_indices(len(schur))] *= 1.0 + softness
+            self._schur = linalg.cho_factor(schur, check_finite=False)
+
+    def _alone(self, right: np.ndarray) -> np.ndarray:
+        return np.asarray(linalg.cho_solve(self._operator, right, check_finite=False))
+
+    def _closing(self, change: np.ndarray, closing: np.ndarray) -> np.ndarray:
+        """Further change by which the rows of a ``change`` (6 n, k) come to ``closing`` (m, k)."""
+        left = closing - self._rows @ change
+        return np.asarray(self._soft @ linalg.cho_solve(self._schur, left, check_finite=False))
+
+
+class Augmented(_Multipliers):
     """The augmented Lagrangian: ``penalty`` relative to what rows feel of A."""
 
     feedback: float | None = None
@@ -121,19 +144,11 @@ class Augmented:
     def __init__(
         self, penalty: float = 1e8, tolerance: float = 1e-12, max_iterations: int = 30
     ) -> None:
-        if penalty <= 0.0:
-            raise InputError(f"The augmented Lagrangian's penalty {penalty} must be positive.")
         self.penalty, self.tolerance, self.max_iterations = penalty, tolerance, max_iterations
 
     def factor(self, operator: np.ndarray, jacobian: np.ndarray) -> None:
         """(A + a J^T J)^-1 a J^T as A^-1 J^T (1 / a + J A^-1 J^T)^-1, which loses no digits."""
-        self._jacobian = jacobian
-        self._operator = linalg.cho_factor(operator, check_finite=False)
-        self._soft = linalg.cho_solve(self._operator, jacobian.T, check_finite=False)
-        schur = jacobian @ self._soft
-        if len(schur):
-            schur[np.diag_indices(len(schur))] *= 1.0 + 1.0 / self.penalty
-            self._schur = linalg.cho_factor(schur, check_finite=False)
+        self._factor_rows(operator, jacobian, 1.0 / self.penalty)
 
     def solve(self, right: np.ndarray, closing: np.ndarray) -> np.ndarray:
         """Unconstrained changes, then multipliers until they close.
@@ -143,18 +158,17 @@ class Augmented:
         NotConverged
             They do not close.
         """
-        return self._closed(linalg.cho_solve(self._operator, right, check_finite=False), closing)
+        return self._closed(self._alone(right), closing)
 
     def removal(self, errors: np.ndarray) -> np.ndarray:
         """The displacement that is smallest as A measures it."""
-        return self._closed(np.zeros((self._jacobian.shape[1], 1)), -errors[:, None])[:, 0]
+        return self._closed(np.zeros((self._rows.shape[1], 1)), -errors[:, None])[:, 0]
 
     def _closed(self, change: np.ndarray, closing: np.ndarray) -> np.ndarray:
         if not len(closing):
             return change
         for _ in range(self.max_iterations):
-            left = closing - self._jacobian @ change
-            step = self._soft @ linalg.cho_solve(self._schur, left, check_finite=False)
+            step = self._closing(change, closing)
             change = change + step
             # Each right side by its own size: unit forces move far less than accelerations.
             size = np.abs(change).max(axis=0)
@@ -166,7 +180,7 @@ class Augmented:
         )
 
 
-class WithFeedback:
+class WithFeedback(_Multipliers):
     """Baumgarte's method.
 
     ``feedback``: frequency and damping of errors times the step; 1 lets an error die out within a
@@ -176,8 +190,6 @@ class WithFeedback:
     feedback: float | None
 
     def __init__(self, feedback: float = 1.0) -> None:
-        if feedback <= 0.0:
-            raise InputError(f"Baumgarte's feedback {feedback} must be positive.")
         self.feedback = feedback
         self._kept = np.zeros(0, dtype=int)
         self._n_rows = -1
@@ -186,20 +198,12 @@ class WithFeedback:
         """The Schur complement of independent rows."""
         if len(jacobian) != self._n_rows:
             self._n_rows, self._kept = len(jacobian), independent_rows(jacobian)
-        rows = jacobian[self._kept]
-        self._rows = rows
-        self._operator = linalg.cho_factor(operator, check_finite=False)
-        self._soft = linalg.cho_solve(self._operator, rows.T, check_finite=False)
-        if len(rows):
-            self._schur = linalg.cho_factor(rows @ self._soft, check_finite=False)
+        self._factor_rows(operator, jacobian[self._kept])
 
     def solve(self, right: np.ndarray, closing: np.ndarray) -> np.ndarray:
         """Unconstrained changes, then the multipliers' part."""
-        change = linalg.cho_solve(self._operator, right, check_finite=False)
-        if not len(self._kept):
-            return change
-        left = closing[self._kept] - self._rows @ change
-        return change + self._soft @ linalg.cho_solve(self._schur, left, check_finite=False)
+        change = self._alone(right)
+        return change + self._closing(change, closing[self._kept]) if len(self._kept) else change
 
     def removal(self, errors: np.ndarray) -> np.ndarray:
         """None: errors are left to the feedback."""

@@ -20,9 +20,9 @@ import numpy as np
 from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.rigid.arrays import FlatLines, FlatRows, Joint
+from catenary.mbs.rigid.arrays import FlatRows, Joint
 from catenary.mbs.rigid.bodies import Body, Motion, initial_motion
-from catenary.mbs.rigid.forces import Force
+from catenary.mbs.rigid.forces import BetweenPoints, FlatLines, Force, OffLine
 from catenary.mbs.rigid.kinematics import Quantity
 from catenary.mbs.rigid.least_squares import least_squares
 from catenary.solver.kernels import native
@@ -127,13 +127,13 @@ class System:
 
     @cached_property
     def lines(self) -> FlatLines:
-        """The forces that act along lines."""
+        """The forces between points."""
         return FlatLines(self.forces, self.start())
 
     @cached_property
-    def other_forces(self) -> tuple[Force, ...]:
-        """The forces that do not."""
-        return tuple(force for force in self.forces if force.on_line() is None)
+    def other_forces(self) -> tuple[OffLine, ...]:
+        """All other forces."""
+        return tuple(force for force in self.forces if not isinstance(force, BetweenPoints))
 
     @cached_property
     def _inertia(self) -> np.ndarray:
@@ -142,7 +142,7 @@ class System:
     def generalised_forces(self, motion: Motion, time: float) -> np.ndarray:
         """g (6 n,) [N, N m]: all forces, and the gyroscopic moments -omega x J omega."""
         length, rate, gradient = self.lines.geometry(motion)
-        result = self.lines.pulls(length, rate, time) @ -gradient
+        result = self.lines.pulls(length, rate) @ -gradient
         for force in self.other_forces:
             result += force.generalised(motion, time)
         native.add_gyroscopic_moments(result, self._inertia, motion.spin)

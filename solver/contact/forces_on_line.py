@@ -33,34 +33,6 @@ def sideways_of(
     return native.Sideways(local, mine, rest)
 
 
-class WiresAcross:
-    """Lateral motion of the contact wires at n contacts, summed over ranks.
-
-    It is taken after a free step, without what the step's contact forces and slack droppers add:
-    beside an arm h^2 / 4 times a force on some kilograms, less than 1e-4 m in steps of 1 ms.
-
-    Parameters
-    ----------
-    across : (3, n) what ``native.Across`` is on rank 0, row by row; overwritten
-
-    Attributes
-    ----------
-    share : ``native.Across`` of this rank
-    """
-
-    def __init__(self, comm: Any, across: np.ndarray) -> None:
-        self._comm, self._across = comm, across
-        self._share = across if comm.size == 1 else np.zeros(across.shape)
-        self.share = native.Across(*self._share)
-
-    def find(self, contacts: native.Contacts) -> None:
-        """Fill in where the contacts, which are located, meet the wires. Collective."""
-        native.find_across(contacts)
-        if self._comm.size > 1:
-            everything = self._across if self._comm.rank == 0 else None
-            self._comm.Reduce(self._share, everything, op=MPI.SUM, root=0)
-
-
 class ForceColumns:
     """Columns of A^-1 for forces on a line: of contacts, and of links that switch.
 
@@ -123,7 +95,8 @@ class ForcesOnLine:
     train_speed : V of the convective part of the gap rate [m/s]
     uses_rate : whether the contact law needs the gap rate
     work : of the contact forces; sums go on from those that it holds
-    across : (3, n) what ``find_across`` fills in, without columns if wires do not move sideways
+    across : (3, n) what ``find_across`` fills in on rank 0, row by row what ``native.Across`` is;
+        without columns if wires do not move sideways
     motion : of the line in one of several scenes
     """
 
@@ -144,15 +117,15 @@ class ForcesOnLine:
         motion: LineState | None = None,
     ) -> None:
         motion = motion or line.motion
-        self.line = line
+        self._comm, self.line = comm, line
         self.wires, self.links = wires, links
         self._free = columns.free
         self.link_coupling, self.reach = columns.link_coupling, columns.reach
         n, n_local = candidates.place.size, line.ownership.n_local
-        self._across = WiresAcross(comm, across)
-        self._moves_across = across.size > 0
+        self._across = across
+        self._share_across = across if comm.size == 1 else np.zeros(across.shape)
         sideways = _no_sideways()
-        if self._moves_across:
+        if across.size:
             sideways = sideways_of(model, form, wires, line.ownership)
         self.contacts = native.Contacts(
             x=candidates.place,
@@ -171,7 +144,7 @@ class ForcesOnLine:
             link_columns=columns.of_links,
             work=work,
             sideways=sideways,
-            across=self._across.share,
+            across=native.Across(*self._share_across),
         )
         self._place = native.place.bound(self.contacts)
         self._heights = native.heights.bound(self.contacts)
@@ -204,10 +177,15 @@ class ForcesOnLine:
     def find_across(self) -> None:
         """Find where wires are across the track, and how that changes, where contacts were located.
 
-        Collective; does nothing if wires do not move sideways.
+        It is taken after a free step, without what the step's contact forces and slack droppers
+        add: beside an arm h^2 / 4 times a force on some kilograms, less than 1e-4 m in steps of
+        1 ms. Collective; does nothing if wires do not move sideways.
         """
-        if self._moves_across:
-            self._across.find(self.contacts)
+        if self._across.size:
+            native.find_across(self.contacts)
+            if self._comm.size > 1:
+                everything = self._across if self._comm.rank == 0 else None
+                self._comm.Reduce(self._share_across, everything, op=MPI.SUM, root=0)
 
     def heights(self, height: np.ndarray, rate: np.ndarray) -> None:
         """Fill in this rank's share of wire height [m] and its total rate [m/s] at each contact.

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from catenary.mbs.interface import HeadState
-from catenary.solver.contact.line_response import affine
-from catenary.solver.kernels import native
 
 
 class Heads(HeadState):
@@ -14,20 +12,13 @@ class Heads(HeadState):
 
     The compliances are zero between strips of different pantographs. ``early_height`` and
     ``early_velocity`` (n,) hold what an extrapolation of the motion says, if a coupling asks for
-    it. ``affine`` are the same numbers under the names that they have for line and gap.
+    it.
     """
-
-    affine: native.Affine
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
         self.early_height = np.zeros(n)
         self.early_velocity = np.zeros(n)
-
-    def take(self, numbers: np.ndarray, n_strips: int) -> None:
-        """Stand for these numbers."""
-        super().take(numbers, n_strips)
-        self.affine = affine(numbers, n_strips)
 
     @property
     def n(self) -> int:

@@ -9,16 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.solver.kernels.native import FLAGS, Affine, Bounds, Share
+from catenary.mbs.interface import affine
+from catenary.solver.kernels.native import FLAGS, Bounds, Share
 
 # Numbers that add up over ranks besides answers.
 N_FLAGS = FLAGS.itemsize // 8
-
-
-def affine(numbers: np.ndarray, n: int) -> Affine:
-    """Views of 2 n + 2 n^2 ``numbers``, in which the four stand one after the other."""
-    squares = numbers[2 * n : 2 * n * (1 + n)].reshape(2, n, n)
-    return Affine(numbers[:n], numbers[n : 2 * n], squares[0], squares[1])
 
 
 class Rows(NamedTuple):

@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from catenary.base.parallel import on_root
-from catenary.mbs.air import Airflow
-from catenary.mbs.build import Operation, has_joints, make_pantograph, steady_forces
+from catenary.mbs.build import (
+    Operation,
+    PantographData,
+    has_joints,
+    make_pantograph,
+    steady_forces,
+)
 from catenary.mbs.called_model import CalledModel
 from catenary.mbs.head.head_arrays import N_DRIVE, named
 from catenary.mbs.head.newmark_head import SteppedHead
@@ -335,11 +340,11 @@ class Pantographs:
         nominal_height: Callable[[Placement], float],
     ) -> None:
         """Make and place all models. Rank 0 only."""
-        velocity = np.zeros(self.n)
+        velocity, numerics = np.zeros(self.n), problem.numerics
+        newmark = numerics.dt, numerics.beta, numerics.gamma
         if isinstance(problem.contact, KinematicLaw):
             velocity = self.speed * self._wires.rest_slope(self._start)
         for number, placement in enumerate(problem.train.placements):
-            height = nominal_height(placement)
             base = _base(problem, simulated, placement)
             path: CrossingPath | None = None
             if self.lateral:
@@ -352,40 +357,28 @@ class Pantographs:
                 path = _lateral_path(problem, placement, base, self._wires, rake)
             flow = airflow(problem, simulated, placement)
             self.along_track |= any(own is not None and own.along_track for own in (base, flow))
-            model = _make(problem, simulated, placement, height, self.n_wires, base, flow, path)
+            operation = Operation(
+                placement.static_force,
+                nominal_height(placement),
+                Stepping(problem.train.raise_time, *newmark, path, base),
+                flow,
+                placement.lowering if simulated.lowering else None,
+                placement.regulator if simulated.regulated_lift else None,
+                simulated.head_roll,
+            )
+            model = make_pantograph(_simulated(placement, simulated, self.n_wires), operation)
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
         self.measure_joints()
 
 
-def _make(
-    problem: Problem,
-    simulated: Simulated,
-    placement: Placement,
-    nominal_height: float,
-    n_wires: int,
-    base: BaseMotion | None,
-    flow: Airflow | None,
-    path: CrossingPath | None,
-) -> Pantograph:
-    numerics, train = problem.numerics, problem.train
-    stepping = Stepping(train.raise_time, numerics.dt, numerics.beta, numerics.gamma, path, base)
-    operation = Operation(
-        placement.static_force,
-        nominal_height,
-        stepping,
-        flow,
-        placement.lowering if simulated.lowering else None,
-        placement.regulator if simulated.regulated_lift else None,
-        simulated.head_roll,
-    )
+def _simulated(placement: Placement, simulated: Simulated, n_wires: int) -> PantographData:
+    """Data of a pantograph below so many wires, without what is not simulated."""
     data = placement.data
     laws = data.laws if simulated.pantograph_laws else ()
     flexure = data.strips.flexure if simulated.flexible_strips else None
-    strips = replace(data.strips, wires=n_wires, flexure=flexure)
-    data = replace(data, strips=strips, laws=laws)
-    return make_pantograph(data, operation)
+    return replace(data, strips=replace(data.strips, wires=n_wires, flexure=flexure), laws=laws)
 
 
 def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseMotion | None:

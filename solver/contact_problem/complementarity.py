@@ -29,8 +29,9 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import NotConverged, RunBroken
+from catenary.mbs.interface import affine
 from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import LineResponse, affine
+from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 

@@ -1,10 +1,13 @@
-"""Slow paths through a step: why free steps are not taken in two passes, and their cost."""
+"""Slow paths through a step: why free steps are not taken in two passes, or steps not in the loop
+of compiled kernels, and their cost. `plan` reads this for a problem, a march for what it steps.
+"""
 
 from __future__ import annotations
 
 import logging
 from typing import NamedTuple
 
+from catenary.mbs.build import has_joints
 from catenary.solver.model.loads import FunctionLoad
 from catenary.solver.model.model import Model
 from catenary.solver.model.unknown_registry import Unknowns
@@ -56,6 +59,28 @@ def slow_path_of(problem: Problem, numbering: Unknowns) -> SlowPath | None:
         return SlowPath("the nodes of the wires are too many or too few to form stations", LIBRARY)
     reason = slow_method(problem.numerics)
     return SlowPath(reason, PARTS) if reason else None
+
+
+def single_steps_of(problem: Problem, in_loop: bool = True) -> SlowPath | None:
+    """Reason why steps of a problem leave the compiled kernels on one rank, None if they do not.
+
+    ``in_loop`` is whether their rows of channels are filled there. Not collective. A scheme other
+    than ``one_solve``, and a coupling that is not implicit, step in their own way, which is
+    reported elsewhere.
+    """
+    numerics = problem.numerics
+    if numerics.scheme != "one_solve" or numerics.coupling == "explicit":
+        return None
+    # Factors are those of the case ambrosio2012 with its lumped pantograph; the largest is first.
+    if any(has_joints(place.data) for place in problem.train.placements):
+        return SlowPath("a pantograph has all its bodies in the time loop", 40.0)
+    if numerics.coupling == "iterated":
+        return SlowPath('numerics.coupling = "iterated" repeats the exchange of forces', 9.0)
+    if numerics.adaptive_tolerance is not None:
+        return SlowPath("numerics.adaptive_tolerance_N lets steps be halved", 5.5)
+    if not in_loop:
+        return SlowPath("a channel is a Python function, called after each step", 3.0)
+    return None
 
 
 def slow_method(numerics: Numerics) -> str:

@@ -1,4 +1,7 @@
-"""Kernels of the time loop, compiled from C++: names and types of the extension."""
+"""Kernels of the time loop, compiled from C++: names and types of the extension.
+
+What functions, records and methods do and hold is said where they are declared, in the headers.
+"""
 
 from collections import namedtuple
 from collections.abc import Callable, Sequence
@@ -22,7 +25,7 @@ class Bound:
 
     def __call__(self, *later: Any) -> Any: ...
 
-# Records: named tuples of the members of structs in C++, whose headers say what each of them is.
+# Records: named tuples of the members of structs in C++.
 Across = namedtuple("Across", "place, rate, moved")
 Affine = namedtuple("Affine", "place, rate, by_force, rate_by_force")
 Ahead = namedtuple("Ahead", "dt, n_done, drives, ties, one_speed, longest_way")
@@ -166,27 +169,13 @@ class Head:
     further arrays of the model, and reads and writes them in place."""
 
     first: int
-    """Number of its first contact among the train's contacts."""
     added_force: float
-    """Force that the regulation now adds to the static force [N]; put without a regulation."""
-    def bend(self, bending: object) -> None:
-        """Let strips bend, see ``Bending``."""
-
-    def lower(self, lowering: object) -> None:
-        """Let the head be caught when it has been lowered, see ``Lowering``."""
-
-    def regulate(self, regulation: object) -> None:
-        """Let the lift be regulated, see ``Regulation``."""
-
-    def step(self, drive: np.ndarray) -> bool:
-        """Step without contact, with a row of a ``DRIVE`` and where wires are on the strips;
-        whether the head is where its model reaches."""
-
-    def advance(self, contact_force: np.ndarray) -> None:
-        """Make the state that under contact forces (s,) [N], after a step without."""
-
-    def extrapolate(self, drive: np.ndarray, early: np.ndarray) -> None:
-        """Fill in heights and velocities (2, s) of the strips by Newmark's predictor."""
+    def bend(self, bending: object) -> None: ...
+    def lower(self, lowering: object) -> None: ...
+    def regulate(self, regulation: object) -> None: ...
+    def step(self, drive: np.ndarray) -> bool: ...
+    def advance(self, contact_force: np.ndarray) -> None: ...
+    def extrapolate(self, drive: np.ndarray, early: np.ndarray) -> None: ...
 
 class LinearChain(Head):
     """A chain of lumped masses on linear springs and dampers."""
@@ -203,8 +192,7 @@ class RaisedHead(Head):
 
     def __init__(self, arrays: object, masses: object, laws: object, mechanism: object) -> None: ...
     @property
-    def height(self) -> float:
-        """At which the mechanism's tables were taken in the latest step [m]."""
+    def height(self) -> float: ...
 
 class CalledHead(Head):
     """A head whose steps are calls: ``predict(time)`` fills ``out``, see ``HeadState.numbers``, and
@@ -290,25 +278,15 @@ class Layout:
     def __init__(
         self, own: np.ndarray, beside: np.ndarray, damped: bool, factors: bool
     ) -> None: ...
-    def places(self, which: str) -> np.ndarray:
-        """Row and column of each number of a packed block (2, n), -1 where it is zero: of the
-        station's ``own``, of those ``beside`` it, or of ``half`` of a symmetric own."""
-
+    def places(self, which: str) -> np.ndarray: ...
     @property
-    def is_sparse(self) -> bool:
-        """Whether factors keep S^-1 alone, and not -B^T S^-1 beside it."""
-
+    def is_sparse(self) -> bool: ...
     @property
-    def n_products(self) -> int:
-        """Products of vectors that a row of such blocks makes."""
-
+    def n_products(self) -> int: ...
     @property
-    def n_vectors(self) -> int:
-        """Vectors that hold the unknowns of a station."""
-
+    def n_vectors(self) -> int: ...
     @property
-    def row_size(self) -> int:
-        """Numbers of a packed row."""
+    def row_size(self) -> int: ...
 
 def are_compiled(rows: Layout, factors: Layout) -> bool:
     """Whether kernels were compiled for stations of such rows and factors; general kernels step
@@ -331,8 +309,7 @@ class Products:
         factor: np.ndarray,
         velocity: np.ndarray,
         result: np.ndarray,
-    ) -> None:
-        """Fill in the rows from ``begin`` to ``end`` of ``result``."""
+    ) -> None: ...
 
 class Solves:
     """Solves with factors of stations of each type."""
@@ -340,25 +317,17 @@ class Solves:
     def __init__(
         self, layouts: Sequence[Layout], station_types: Sequence[Sequence[int]], factors: object
     ) -> None: ...
-    def solve(self, right: np.ndarray, answer: np.ndarray) -> None:
-        """Fill ``answer``, which may be ``right``."""
+    def solve(self, right: np.ndarray, answer: np.ndarray) -> None: ...
 
 class TwoPasses:
     """Free steps in two passes with the arrays of ``PassParts``, which they keep, read and write in
     place."""
 
     def __init__(self, parts: object) -> None: ...
-    def track(self, links: object) -> None:
-        """Look at ``TrackedLinks`` on the way back."""
-
-    def open(self, window: object) -> None:
-        """Take steps of the stations in a ``Window`` only from now on."""
-
-    def step(self) -> None:
-        """Take a step."""
-
-    def predict_velocities(self) -> None:
-        """Fill in the velocities that others read in products with C, if there are such."""
+    def track(self, links: object) -> None: ...
+    def open(self, window: object) -> None: ...
+    def step(self) -> None: ...
+    def predict_velocities(self) -> None: ...
 
 LEAST_STATIONS: int
 
@@ -382,145 +351,75 @@ class Steps:
     """Steps of the scheme ``one_solve`` on one rank, of ``StepParts`` and a ``Block`` of these."""
 
     def __init__(self, parts: object, block: object) -> None: ...
-    def take(self, first: int, end: int) -> Taken:
-        """Take the steps of the block from number ``first`` on up to before ``end``."""
-
-    def write(self, path: str, ahead: object) -> None:
-        """Write a file with the parts of the steps, and the inputs ``Ahead``."""
+    def take(self, first: int, end: int) -> Taken: ...
+    def write(self, path: str, ahead: object) -> None: ...
 
 class ScenePasses:
     """``TwoPasses`` in several scenes side by side, with arrays of all of them in ``parts``."""
 
     def __init__(self, parts: object) -> None: ...
-    def step(self) -> None:
-        """Take a step in all scenes."""
-
-    def track(self, links: object, rest: np.ndarray, reserves: Sequence[np.ndarray]) -> None:
-        """Fill ``reserves`` (n,) of links in each lane; at rest ``rest`` (n, n_lanes) [N]."""
-
-    def rest(self, lane: int) -> None:
-        """Put the line of a lane at rest."""
+    def step(self) -> None: ...
+    def track(self, links: object, rest: np.ndarray, reserves: Sequence[np.ndarray]) -> None: ...
+    def rest(self, lane: int) -> None: ...
 
 class Ensemble:
-    """Marches of several scenes side by side, each in a lane of vectors.
-
-    Parameters
-    ----------
-    passes : free steps of their lines
-    extremes : ``LineExtremes``
-    """
+    """Marches of several scenes side by side, with ``LineExtremes``."""
 
     def __init__(self, passes: ScenePasses, extremes: object) -> None: ...
-    def begin(self, lane: int, steps: Steps, n: int) -> None:
-        """Let a scene begin in a lane, with n steps of its block."""
-
-    def take(self, most: int) -> None:
-        """Take steps until a scene is at its end, or left, or until so many were taken."""
-
-    def at(self, lane: int) -> tuple[int, bool]:
-        """Steps that the scene of a lane has taken, and whether its forces were not found then."""
+    def begin(self, lane: int, steps: Steps, n: int) -> None: ...
+    def take(self, most: int) -> None: ...
+    def at(self, lane: int) -> tuple[int, bool]: ...
 
 class LanePasses:
     """``TwoPasses`` of tangents side by side, with arrays of all lanes in ``parts``, of the
     stations that move: ``guard`` outer ones are looked at, or all move from the start on if it is
-    0. See ``kernels/tangents/lane_passes.hpp``."""
+    0."""
 
     def __init__(self, parts: object, guard: int) -> None: ...
     @property
-    def begin(self) -> int:
-        """First unknown that moves."""
-
+    def begin(self) -> int: ...
     @property
-    def end(self) -> int:
-        """The unknown after the last that moves."""
+    def end(self) -> int: ...
 
 class TangentSteps:
     """``Steps`` with derivatives by parameters beside them, of ``Tangents``."""
 
     def __init__(self, parts: object, block: object, tangents: object) -> None: ...
-    def take(self, first: int, end: int) -> Taken:
-        """As ``Steps.take``."""
+    def take(self, first: int, end: int) -> Taken: ...
 
 TIE: np.dtype[np.void]
 
 class Simulation:
-    """A prepared line with its pantographs, stepped from outside.
+    """A prepared line with its pantographs, stepped from outside, see ``catenary.Simulation``.
 
-    It needs no PETSc and no MPI. Arrays look into it, and last as long as they are held.
-
-    Parameters
-    ----------
-    path : of a file that ``catenary prepare`` wrote; numbers in it are not checked: trust it as far
-        as a program
-
-    Raises
-    ------
-    RuntimeError
-        If it cannot be read, is damaged, or is of another version.
+    Arrays look into it, and last as long as they are held.
     """
 
     def __init__(self, path: str) -> None: ...
-    def step(self, n: int = 1) -> bool:
-        """Take n steps; False if the end of the line, or of the file's inputs, came before.
-
-        Raises
-        ------
-        RuntimeError
-            If the forces of a step could not be found: nothing can be stepped further.
-        """
-
-    def set_speed(self, speed: float) -> bool:
-        """Let the train go on at another speed [m/s], at least 0; False if the file tells where
-        wires are across the track, which holds for one speed only."""
-
-    def save(self) -> bytes:
-        """The state, to come back to."""
-
-    def restore(self, state: bytes) -> None:
-        """Go back to a state of this line."""
-
+    def step(self, n: int = 1) -> bool: ...
+    def set_speed(self, speed: float) -> bool: ...
+    def save(self) -> bytes: ...
+    def restore(self, state: bytes) -> None: ...
     @property
-    def inputs(self) -> np.ndarray:
-        """Inputs of each pantograph (n,), added from the next step on: ``lift_force`` to the static
-        force and ``head_force`` on the head or its strips on springs, upward [N], and of its base
-        the height ``base`` [m], ``base_velocity`` [m/s] and ``base_acceleration`` [m/s2]; all 0 at
-        first."""
-
+    def inputs(self) -> np.ndarray: ...
     @property
-    def time(self) -> float:
-        """Since time zero [s]."""
-
+    def time(self) -> float: ...
     @property
-    def dt(self) -> float:
-        """A step [s]."""
-
+    def dt(self) -> float: ...
     @property
-    def way(self) -> float:
-        """Of the train since time zero [m]."""
-
+    def way(self) -> float: ...
     @property
-    def speed(self) -> float:
-        """Of the train [m/s]."""
-
+    def speed(self) -> float: ...
     @property
-    def n_steps_left(self) -> int:
-        """Steps left for which the file has inputs."""
-
+    def n_steps_left(self) -> int: ...
     @property
-    def contact_force(self) -> np.ndarray:
-        """Of each pantograph after the latest step (n,) [N]."""
-
+    def contact_force(self) -> np.ndarray: ...
     @property
-    def head_height(self) -> np.ndarray:
-        """Mean height of its strips (n,) [m]."""
-
+    def head_height(self) -> np.ndarray: ...
     @property
-    def wire_height(self) -> np.ndarray:
-        """Mean height of the contact wire over them (n,) [m]."""
-
+    def wire_height(self) -> np.ndarray: ...
     @property
-    def strip_force(self) -> np.ndarray:
-        """Of each strip, strips of one pantograph after another (n_strips,) [N]."""
+    def strip_force(self) -> np.ndarray: ...
 
 def targets() -> list[str]:
     """Targets that kernels were compiled for and this processor can run, the best last."""

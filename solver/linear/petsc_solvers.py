@@ -18,10 +18,7 @@ from scipy import sparse
 
 from catenary.base.errors import InputError
 from catenary.base.petsc import PETSc
-from catenary.solver.linear.station_factors import StationFactors, station_factors
-from catenary.solver.linear.stations.sections import Sections
-from catenary.solver.linear.stations.station_layout import Layout
-from catenary.solver.linear.stations.station_rows import StationRows
+from catenary.solver.linear.station_factors import StationFactors
 from catenary.solver.model.matrices import as_petsc
 from catenary.solver.model.partition import Ownership
 
@@ -112,13 +109,9 @@ class PartSolver(KspSolver):
     Parameters
     ----------
     part : assembles the part of the operator, in blocks of stations or of nodes
-    own : range of the rank's own blocks in the part
     in_stations : whether the blocks are stations
     is_whole : whether the part is the whole line, which decides the prefix of its options
-    layout, stations, rows : of the part by stations, None if our own factors cannot be used or
-        have been made
-    turns : whether the place where our own elimination ends may move
-    factors : our own factors, if they have been made
+    factors : our own, None if they cannot be used
 
     Attributes
     ----------
@@ -128,20 +121,12 @@ class PartSolver(KspSolver):
     def __init__(
         self,
         part: Callable[[], sparse.bsr_matrix],
-        own: slice,
         in_stations: bool,
         is_whole: bool,
-        layout: Layout | None = None,
-        stations: Sections | None = None,
-        rows: StationRows | None = None,
-        turns: bool = False,
         factors: StationFactors | None = None,
     ) -> None:
         self._part, self._in_stations = part, in_stations
-        self._prefix = PREFIX if is_whole else PART_PREFIX
-        self.factors = factors
-        if layout and stations and rows and not _is_given(f"{self._prefix}pc_"):
-            self.factors = station_factors(rows, layout, stations, own.start, own.stop, turns)
+        self._prefix, self.factors = _prefix(is_whole), factors
         self._made: list[Callable[[], object]] = []  # what frees PETSc's objects
         self._solve: Callable[[Wrapped, Wrapped], None] = super().solve
         if self.factors is None or _is_given(f"{self._prefix}ksp_", f"{self._prefix}mat_"):
@@ -288,6 +273,11 @@ def wants_distributed_solver() -> bool:
     )
 
 
+def allows_own_factors(is_whole: bool) -> bool:
+    """Whether PETSc's options choose no factors for a part of a line, or for the whole one."""
+    return not _is_given(f"{_prefix(is_whole)}pc_")
+
+
 def wants_own_solver() -> bool:
     """Whether PETSc's options ask nothing of the solver of a whole line."""
     return not _is_given(*(f"{PREFIX}{kind}_" for kind in ("ksp", "pc", "mat")))
@@ -306,6 +296,10 @@ def wants_solution() -> bool:
 def wants_single_steps() -> bool:
     """Whether PETSc's options ask to drive, see or time steps one by one."""
     return _is_given(f"{PREFIX}ts_", "log_")
+
+
+def _prefix(is_whole: bool) -> str:
+    return PREFIX if is_whole else PART_PREFIX
 
 
 def _destroy(*objects: PETSc.Object) -> None:

@@ -20,6 +20,7 @@ from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import Layout
 from catenary.solver.linear.stations.station_products import kinds_by_type, of_pairs
 from catenary.solver.linear.stations.station_rows import StationRows
+from catenary.solver.model.alike import numbered
 
 # Distance in stations between the places at which elimination may end, if there are several.
 MIDDLES = native.MIDDLES
@@ -222,9 +223,8 @@ class FoundFactors(NamedTuple):
         n_before, n_behind = len(before), len(behind)
         parts = [at_before, n_before + at_behind, n_before + n_behind + at_middle.ravel()]
         numbers = np.concatenate(parts if middle is None else [parts[0], parts[2], parts[1]])
-        found, first_met, number = np.unique(numbers, return_index=True, return_inverse=True)
-        order = np.argsort(first_met)
+        first_met, number = numbered(numbers)
         factors = np.concatenate([before, behind, here])
         of_factor = np.concatenate([kinds_before, kinds_behind, triples[:, 0]])
-        chosen = found[order]
-        return cls(factors[chosen], of_factor[chosen], np.argsort(order)[number])
+        chosen = numbers[first_met]
+        return cls(factors[chosen], of_factor[chosen], number)

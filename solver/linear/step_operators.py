@@ -25,11 +25,12 @@ from catenary.solver.linear.petsc_solvers import (
     PartSolver,
     SchwarzSolver,
     Wrapped,
+    allows_own_factors,
     wants_distributed_solver,
     wants_view,
 )
 from catenary.solver.linear.pieces.operator_pieces import OperatorPieces
-from catenary.solver.linear.station_factors import StationFactors
+from catenary.solver.linear.station_factors import StationFactors, station_factors
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.stations.sections import Sections
 from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS
@@ -389,23 +390,21 @@ class LineOperators:
         if self.domain.size:
             rows, owned = (low, high), self.domain.owned
             products, stations = self._products, Sections.of(self._model.numbering, low, high)
-            own = slice(*np.searchsorted(stations.starts, [owned.start, owned.stop]).tolist())
-            operator, pieces = None, self.in_pieces
-            if self._in_stations and pieces is None:
+            begin, end = np.searchsorted(stations.starts, [owned.start, owned.stop]).tolist()
+            operator, whole = None, self._comm.size == 1
+            factors = None if self.in_pieces is None else self.in_pieces.factors.factors
+            if self._in_stations and factors is None:
                 operator = products.find_layout(self._coefficients)
-            whole = self._comm.size == 1
-            turns = whole and self._model.problem.window.moves
+            if operator is not None and products.layout and allows_own_factors(whole):
+                turns = whole and self._model.problem.window.moves
+                factors = station_factors(operator, products.layout, stations, begin, end, turns)
 
             def assembled() -> sparse.bsr_matrix:
                 return part_of(self._model, rows, rows, self._coefficients, 1.0, self._block)
 
-            solver = PartSolver(
-                *(assembled, own, self._in_stations, whole, products.layout, stations, operator),
-                turns,
-                None if pieces is None else pieces.factors.factors,
-            )
+            solver = PartSolver(assembled, self._in_stations, whole, factors)
             self._solver, is_direct = solver, solver.is_direct
-            if operator is not None and solver.factors is not None:
+            if operator is not None and factors is not None:
                 self._checked = products.of_operator(operator)
         self._is_direct = bool(self._comm.allreduce(int(is_direct), op=MPI.MIN))
 

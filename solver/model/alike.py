@@ -19,13 +19,18 @@ def kinds_of(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Kinds are numbered as they are met, so that rows read theirs from memory mostly in order.
     """
-    _, first, kinds = np.unique(digests(rows), return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    first, kinds = first[order], np.argsort(order)[kinds]
+    first, kinds = numbered(digests(rows))
     if not (rows == rows[first][kinds]).all():
         # Two different rows of one digest, as good as impossible, or what is no number.
         return np.arange(rows.shape[0]), np.arange(rows.shape[0], dtype=np.int32)
-    return first, kinds.astype(np.int32)
+    return first, kinds
+
+
+def numbered(marks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First of each kind of ``marks`` (n,), and the kind of each (n,) int32, as ``kinds_of``."""
+    _, first, kinds = np.unique(marks, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return first[order], np.argsort(order).astype(np.int32)[kinds]
 
 
 def alike(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from catenary.base.petsc import event
 from catenary.mbs.head.head_arrays import drive_width
-from catenary.solver.contact.line_response import affine
+from catenary.mbs.interface import affine
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.kernels import native
 from catenary.solver.schemes.one_solve import OneSolve

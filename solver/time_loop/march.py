@@ -26,7 +26,11 @@ from catenary.base.petsc import PETSc
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.integrators.slow_path import SlowPath, warn_of_slow_path
+from catenary.solver.integrators.slow_path import (
+    SlowPath,
+    single_steps_of,
+    warn_of_slow_path,
+)
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
@@ -46,7 +50,6 @@ from catenary.solver.statics.changed_line.after_incidents import (
 from catenary.solver.statics.elasticity import Elasticity
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.time_loop.compiled_steps import compiled_steps
-from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.time_loop.ts_stepper import Stepper, ts_of
 from catenary.solver.time_loop.views.observer_list import ObserverList
 from catenary.solver.time_loop.views.observers import Observer
@@ -214,7 +217,7 @@ class March:
         """Reason why steps are slow, None if they are not; with several ranks that of the line."""
         if self._line.slow_path is not None or self._comm.size > 1:
             return self._line.slow_path
-        return single_steps_of(self._problem, self._showing.layout)
+        return single_steps_of(self._problem, self._showing.layout.in_loop)
 
     @property
     def n_steps(self) -> int:

@@ -53,10 +53,8 @@ def test_all_bodies_keep_their_joints_and_energy(seconds: int) -> None:
     for column, name in enumerate(system.lines.names):
         element, length = system.force(name), lengths[:, column]
         if isinstance(element, SpringDamper):
-            assert not callable(element.damping)
             lost += element.damping * np.diff(length) ** 2 / DT
         elif isinstance(element, Actuator):
-            assert not callable(element.force)
             by_actuators += element.force * (length[-1] - length[0])
     gained = energy(system, pantograph.motion) - before
     by_contact = -mean(forces) * np.diff(heights)

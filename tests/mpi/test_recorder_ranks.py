@@ -104,7 +104,6 @@ def make_view(step: int, share: Share) -> StepView:
         time=step * DT,
         row=row,
         columns=columns,
-        node_uplift=lambda: 1e-3 * step + share(N_NODES),
         node_motion=lambda name, rate, among=slice(None): (
             1e-3 * step + (2.0 if rate else 1.0) * share(N_NODES)[among]
         ),

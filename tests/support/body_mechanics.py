@@ -13,11 +13,49 @@ from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
 from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
 from catenary.mbs.rigid.bodies import Body, Motion, Vector, normalised
-from catenary.mbs.rigid.forces import BumpStop, Force, Gravity, SpringDamper
+from catenary.mbs.rigid.forces import BetweenPoints, BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import unit
 from catenary.mbs.rigid.kinematics import Law, point
 from catenary.mbs.rigid.least_squares import null_space
 from catenary.mbs.rigid.system import System
+
+
+class LineBetween(NamedTuple):
+    """The line between points of two bodies: its length [m], its rate [m/s], d length / d q."""
+
+    length: float
+    rate: float
+    gradient: np.ndarray
+
+
+def place_of(motion: Motion, body: str, local: Vector) -> tuple[np.ndarray, np.ndarray]:
+    """Place of a point of a body (3,) [m] and its Jacobian (3, 6 n): translations in space axes,
+    then turns in body axes, which move it by their cross products with its place in the body."""
+    i, (x, y, z) = motion.numbers[body], local
+    jacobian = np.zeros((3, 6 * motion.n_bodies + 6))
+    turns = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    jacobian[:, 6 * i : 6 * i + 6] = np.hstack([np.eye(3), motion.rotation[i] @ turns])
+    return motion.position[i] + motion.rotation[i] @ np.asarray(local), jacobian[:, :-6]
+
+
+def line_of(force: BetweenPoints, motion: Motion) -> LineBetween:
+    """The line along which a force acts, from the kinematics of its points."""
+    (start, before), (end, behind) = (
+        place_of(motion, body, at) for body, at in ((force.i, force.at_i), (force.j, force.at_j))
+    )
+    length = float(np.linalg.norm(end - start))
+    gradient = (end - start) / length @ (behind - before)
+    return LineBetween(length, float(gradient @ motion.velocities), gradient)
+
+
+def generalised(force: Force, motion: Motion, time: float = 0.0) -> np.ndarray:
+    """Generalised forces (6 n,) of a force alone, from the kinematics of its points."""
+    if not isinstance(force, BetweenPoints):
+        return force.generalised(motion, time)
+    line, (stiffness, free_length, damping, preload) = line_of(force, motion), force.linear
+    pull = stiffness * (line.length - free_length) + damping * line.rate + preload
+    pull += force.pull(line.length) if force.pull is not None else 0.0
+    return np.asarray(-pull * line.gradient)
 
 
 class Reaction(NamedTuple):
@@ -44,12 +82,12 @@ def stored_energy(force: Force, motion: Motion) -> float:
     if isinstance(force, Gravity):
         return float(force.acceleration * np.dot(force.masses, motion.position[:-1, 2]))
     if isinstance(force, BumpStop):
-        length = force.line(motion).length
+        length = line_of(force, motion).length
         depth = max(force.shortest - length, length - force.longest, 0.0)
         return 0.5 * force.stiffness * depth**2
     if not isinstance(force, SpringDamper):
         return 0.0
-    extension = force.line(motion).length - force.free_length
+    extension = line_of(force, motion).length - force.free_length
     if callable(force.stiffness):
         closely = {"epsabs": 1e-12, "epsrel": 1e-12, "limit": 200}
         return float(integrate.quad(force.stiffness, 0.0, extension, **closely)[0])
@@ -68,15 +106,15 @@ def static_force(pantograph: RaisingPantograph, head_height: float, time: float 
     The head's springs give way under it. The air acts as it does at a ``time`` [s].
     """
     data, force = pantograph._data, 0.0
-    frame, zero = data.frame, data.head_offset + data.base_height
+    frame, zero = data.frame, data.head.offset + data.base_height
     on_head, on_arm, on_bodies = np.zeros(3)
     if pantograph._air is not None:
         on_head, on_arm, on_bodies = pantograph._blowing(pantograph._air.now(time))
     for _ in range(50):
         previous, below = force, force - on_head
-        arm = head_height + below / data.head_stiffness + data.strips.compression(below) - zero
+        arm = head_height + below / data.head.stiffness + data.strips.compression(below) - zero
         (_, lift, _), _ = frame.at(arm)
-        force = lift - data.head_weight + on_head + on_arm + on_bodies * frame.blown_at(arm)
+        force = lift - data.head.weight + on_head + on_arm + on_bodies * frame.blown_at(arm)
         if abs(force - previous) <= 1e-10 * abs(force):
             return float(force)
     raise AssertionError("the head's springs give way faster than the lift falls")

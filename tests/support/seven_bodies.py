@@ -23,7 +23,7 @@ UPRIGHT = PrescribedAngle(
     "lower link upright",
     SPACE,
     ambrosio.LOWER_LINK,
-    Constant(0.0),
+    0.0,
     axis_i=(1.0, 0.0, 0.0),
     normal_i=(0.0, 0.0, 1.0),
     normal_j=(0.0, 0.0, 1.0),

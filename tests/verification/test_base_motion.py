@@ -118,7 +118,7 @@ def test_the_paper_s_pantograph_on_a_base_that_swings_moves_like_all_its_bodies(
     for motion in (BaseMotion(vehicle, 0.0, 70.0), None):
         reduced = raising_data(data, force, head_height)
         pantograph = RaisingPantograph(reduced, Stepping(0.0, dt, base=motion))
-        z = head_height + force / reduced.head_stiffness
+        z = head_height + force / reduced.head.stiffness
         pantograph.restore(np.array([head_height, z, 0.0, 0.0, 0.0, 0.0]))
         for step in range(round(end / dt)):
             pantograph.predict(dt * (step + 1))

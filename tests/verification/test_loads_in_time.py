@@ -57,11 +57,11 @@ def deflection(
         numerics=numerics(dt, **changes),  # type: ignore[arg-type]
     )
     with registered(Effect("load", "a load", "a load", "test", False, build=build)):
-        history = march(problem, mesh, lambda view: (view.time, view.node_uplift))
-    time, uplift = history.watched[-1]
+        history = march(problem, mesh, lambda view: (view.time, view.node_motion))
+    time, motion = history.watched[-1]
     assert abs(time - DURATION) < 1e-9
     nodes = mesh.wires[CONTACT_WIRE]
-    return mesh.x(nodes), uplift()[np.searchsorted(history.stage.owned_nodes, nodes)]
+    return mesh.x(nodes), motion("w", False)[np.searchsorted(history.stage.owned_nodes, nodes)]
 
 
 def uniform(course: object) -> Build:

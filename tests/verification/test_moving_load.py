@@ -93,12 +93,12 @@ def deflection(
         numerics=numerics(dt),
     )
     with registered(effect):
-        history = march(problem, mesh, lambda view: (view.time, view.node_uplift))
-    time, uplift = history.watched[-1]
+        history = march(problem, mesh, lambda view: (view.time, view.node_motion))
+    time, motion = history.watched[-1]
     assert abs(time - duration) < 1e-9
     assert not history["contact_force"].any()
     nodes = mesh.wires[CONTACT_WIRE]
-    return mesh.x(nodes), uplift()[np.searchsorted(history.stage.owned_nodes, nodes)]
+    return mesh.x(nodes), motion("w", False)[np.searchsorted(history.stage.owned_nodes, nodes)]
 
 
 @pytest.mark.study

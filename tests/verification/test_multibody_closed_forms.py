@@ -11,6 +11,7 @@ from constraint_handling import (
     ConstraintHandling,
     CoordinatePartitioning,
 )
+from driven_angle import DrivenAngle
 from measuring import check
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
@@ -19,7 +20,6 @@ from variable_steps import integrate
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity, SpringDamper
 from catenary.mbs.rigid.joints import (
-    PrescribedAngle,
     Prismatic,
     Revolute,
     RevolutePrismatic,
@@ -123,7 +123,7 @@ def test_slider_crank_at_constant_speed(handling: ConstraintHandling) -> None:
             Revolute("pin", "crank", "link", (r / 2, 0, 0), (-length / 2, 0, 0)),
             Spherical("gudgeon", "link", "slider", (length / 2, 0, 0)),
             Prismatic("guide", SPACE, "slider"),
-            PrescribedAngle("drive", SPACE, "crank", steady(0.0, speed)),
+            DrivenAngle("drive", SPACE, "crank", steady(0.0, speed)),
         ),
     )
     start = system.start()
@@ -189,7 +189,7 @@ def test_four_bar_linkage_turns_its_rocker_as_freudenstein_says(
             Revolute("crank pin", "crank", "coupler", (a / 2, 0, 0), (-b / 2, 0, 0)),
             Revolute("foot of the rocker", SPACE, "rocker", (d, 0, 0), (-c / 2, 0, 0)),
             Spherical("rocker pin", "coupler", "rocker", (b / 2, 0, 0), (c / 2, 0, 0)),
-            PrescribedAngle("drive", SPACE, "crank", steady(0.0, -speed)),
+            DrivenAngle("drive", SPACE, "crank", steady(0.0, -speed)),
         ),
     )
     assert system.n_degrees_of_freedom(system.start()) == 0

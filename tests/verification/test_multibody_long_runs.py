@@ -24,9 +24,9 @@ pytestmark = pytest.mark.study
 def energy(data: RaisingData, pantograph: RaisingPantograph) -> float:
     """Kinetic energy, and elastic energy of the head's springs [J], over a base at rest."""
     (head, arm), (speed, arm_speed) = pantograph.position, pantograph.velocity
-    mass = data.frame.at(arm - data.head_offset - data.base_height)[0][0]
-    elastic = data.head_stiffness * (head - arm) ** 2
-    return 0.5 * float(data.head_mass * speed**2 + mass * arm_speed**2 + elastic)
+    mass = data.frame.at(arm - data.head.offset - data.base_height)[0][0]
+    elastic = data.head.stiffness * (head - arm) ** 2
+    return 0.5 * float(data.head.mass * speed**2 + mass * arm_speed**2 + elastic)
 
 
 def test_plane_pantograph_rests_where_the_bodies_do() -> None:
@@ -68,7 +68,7 @@ def test_ten_minutes_of_the_pantograph_of_the_time_loop() -> None:
     forces = contact_forces(n_steps)
     data = raising_data(paper.data(), STATIC, HEIGHT)
     pantograph = RaisingPantograph(data, Stepping(0.0, DT))
-    still = np.array([HEIGHT, HEIGHT + STATIC / data.head_stiffness])
+    still = np.array([HEIGHT, HEIGHT + STATIC / data.head.stiffness])
     pantograph.restore(np.concatenate([still, np.zeros(4)]))
     places, before = np.empty((n_steps + 1, 2)), energy(data, pantograph)
     places[0] = still
@@ -80,10 +80,10 @@ def test_ten_minutes_of_the_pantograph_of_the_time_loop() -> None:
     wall = time.perf_counter() - begin
     print(f"600 s in {wall:.1f} s: {1e6 * wall / n_steps:.1f} us a step")
     check_no_drift(places[:, 0])
-    frame, arm = data.frame, places[:, 1] - data.head_offset - data.base_height
-    lift = CubicSpline(frame.heights, frame.lifts - data.head_weight).antiderivative()
+    frame, arm = data.frame, places[:, 1] - data.head.offset - data.base_height
+    lift = CubicSpline(frame.heights, frame.lifts - data.head.weight).antiderivative()
     head, frame_way = np.diff(places, axis=0).T
-    lost = data.head_damping * (head - frame_way) ** 2 / DT
+    lost = data.head.damping * (head - frame_way) ** 2 / DT
     lost += CubicSpline(frame.heights, frame.dampings)(mean(arm)) * frame_way**2 / DT
     by_lift = float(lift(arm[-1]) - lift(arm[0]))
     gained = energy(data, pantograph) - before

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import paper_pantograph as ambrosio
 import pytest
-from body_mechanics import energy, equivalent_mass
+from body_mechanics import energy, equivalent_mass, line_of
 from constraint_handling import (
     AugmentedLagrangian,
     Baumgarte,
@@ -57,7 +57,7 @@ def test_published_values_do_not_fit_where_they_are_corrected() -> None:
     check("joint 1 as published [mm]", 1e3 * gaps(published)["joint_1"], 182.0, within=0.5)
     check("joint 1 corrected [mm]", 1e3 * gaps(corrected)["joint_1"], 5.5, within=0.5)
     lengths = [
-        system.force("raising_spring").line(system.start()).length
+        line_of(system.force("raising_spring"), system.start()).length
         for system in (published, corrected)
     ]
     check("raising spring [m]", lengths, (0.056, 0.462), within=5e-4)
@@ -103,7 +103,7 @@ def test_static_force_is_what_the_power_of_all_forces_says() -> None:
         holder = PrescribedPoint("holder", ARM, Constant(height))
         rest = equilibrium(system.with_joints(holder), system.start()).motion
         actuator = system.force(ambrosio.ACTUATOR)
-        return energy(system, rest), actuator.line(rest).length
+        return energy(system, rest), line_of(actuator, rest).length
 
     (above, longer), (below, shorter) = at(1.418 + h), at(1.418 - h)
     expected = (force * (longer - shorter) - (above - below)) / (2 * h)
@@ -197,7 +197,7 @@ def test_head_sinks_into_its_springs_by_its_weight_and_load(load: float) -> None
     system = ambrosio.pantograph().with_forces(PointForce("wire", HEAD, (0, 0, -load)))
     rest = equilibrium(system.with_joints(HOLDER), system.start()).motion
     springs = [system.force(f"head_spring_{side}") for side in ("left", "right")]
-    lengths = [spring.line(rest).length for spring in springs]
+    lengths = [line_of(spring, rest).length for spring in springs]
     expected = 0.103 - (7.8 * 9.81 + load) / 6000.0
     # The assembled arm is tilted by 0.007 rad, at which the head slides: 2e-5 of the load.
     check("springs [m]", lengths, expected, within=3e-5 * (7.8 * 9.81 + load) / 6000.0)

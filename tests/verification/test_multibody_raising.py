@@ -14,6 +14,7 @@ from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.mechanism.multibody_pantograph import Head
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.forces import PointForce
@@ -35,7 +36,7 @@ def test_mechanism_that_is_the_same_at_all_heights_is_two_lumped_masses() -> Non
     frame = ReducedMechanism(
         np.linspace(0.0, 9.0, 5), 15.0 * same, 190.0 * same, 90.0 * same, 15.0 * same
     )
-    data = RaisingData(frame, 7.2, 4200.0, 10.0, 70.0, 0.1, 0.2)
+    data = RaisingData(frame, Head(7.2, 4200.0, 10.0, 70.0, 0.1), 0.2)
     found = RaisingPantograph(data, Stepping(raise_time=0.5, dt=1e-3))
     lumped = LumpedData((7.2, 15.0), (4200.0, 0.0), (10.0, 90.0))
     expected = LumpedPantograph(lumped, 120.0, 5.0, Stepping(raise_time=0.5, dt=1e-3))
@@ -72,7 +73,7 @@ def test_strips_roll_and_a_moving_base_are_the_same_for_both_models() -> None:
     own = Suspension(0.8, 9000.0, 20.0)
     strips = Strips(2, 0.5, 1.6, own, Turning(0.3, 90.0, 2.0))
     roll = Turning(2.0, 470.0, 3.0)
-    data = RaisingData(frame, 7.2, 4200.0, 10.0, 70.0, 0.1, 0.2, strips, roll)
+    data = RaisingData(frame, Head(7.2, 4200.0, 10.0, 70.0, 0.1, roll), 0.2, strips)
     chain = LumpedData((7.2, 15.0), (4200.0, 0.0), (10.0, 90.0), strips, roll)
     vehicle = VehicleMotion((Harmonic(0.02, 2.0, 0.3),), (Harmonic(0.05, 1.0),))
     base = BaseMotion(vehicle, 100.0, 70.0)
@@ -114,7 +115,7 @@ def test_paper_s_pantograph_let_go_rises_like_all_its_bodies() -> None:
     expected = full.position[head, 2]
     frame = ambrosio.frame().with_force_changed(ambrosio.ACTUATOR, force=push)
     tables = reduce_mechanism(frame, ARM, np.linspace(1.3, 1.6, 13))
-    data = RaisingData(tables, 7.8, STIFFNESS, 26.0, WEIGHT, OFFSET)
+    data = RaisingData(tables, Head(7.8, STIFFNESS, 26.0, WEIGHT, OFFSET))
     start = rest.position[head, 2]
     steps, ends = [4e-3, 2e-3, 1e-3, 0.5e-3], []
     for dt in [*steps, 0.125e-3]:
@@ -138,7 +139,7 @@ def test_paper_s_pantograph_let_go_rises_like_all_its_bodies() -> None:
 
 def test_state_is_all_that_is_needed_to_continue() -> None:
     tables = reduce_mechanism(ambrosio.frame(), ARM, np.linspace(1.3, 1.6, 7))
-    data = RaisingData(tables, 7.8, STIFFNESS, 26.0, WEIGHT, OFFSET, base_height=3.6)
+    data = RaisingData(tables, Head(7.8, STIFFNESS, 26.0, WEIGHT, OFFSET), base_height=3.6)
     one, other = (RaisingPantograph(data, Stepping(raise_time=0.05, dt=1e-3)) for _ in range(2))
     one.place(5.1)
     for number in range(50):

@@ -234,5 +234,5 @@ def test_a_mechanism_is_regulated_by_the_head_s_height() -> None:
     check("head [m]", one.position[0], HEIGHT + 0.02, within=1e-5)
     check("force [N]", force, 170.0, within=0.02)
     # 170 N press the head's springs further; the lift of an arm that stands higher is lower.
-    (_, lift, _), _ = raising.frame.at(one.position[1] - raising.head_offset - raising.base_height)
-    check("added [N]", one.added_force, 170.0 - (lift - raising.head_weight), within=0.02)
+    (_, lift, _), _ = raising.frame.at(one.position[1] - raising.head.offset - raising.base_height)
+    check("added [N]", one.added_force, 170.0 - (lift - raising.head.weight), within=0.02)

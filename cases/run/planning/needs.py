@@ -28,10 +28,9 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
-from catenary.solver.integrators.slow_path import SlowPath, slow_path_of
+from catenary.solver.integrators.slow_path import SlowPath, single_steps_of, slow_path_of
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import GAUGES
-from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.window.choice import moving_share
 
 # Time between two flushes of the result file at full speed, each of which takes some 5 ms [s], and

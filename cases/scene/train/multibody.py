@@ -94,9 +94,9 @@ def _joint(name: str, t: schema.JointTable) -> Joint:
             name, t.body, Constant(t.coordinate_m), tuple(t.at_m), tuple(t.along)
         )
     if isinstance(t, schema.PrescribedAngleTable):
-        law = Constant(angle_from_deg(t.angle_deg))
         normals = tuple(t.normal_i), tuple(t.normal_j)
-        return PrescribedAngle(name, t.i, t.j, law, tuple(t.axis_i), *normals)
+        angle = angle_from_deg(t.angle_deg)
+        return PrescribedAngle(name, t.i, t.j, angle, tuple(t.axis_i), *normals)
     at = tuple(t.at_i_m), tuple(t.at_j_m)
     if isinstance(t, schema.FixedTable):
         e0 = np.sqrt(1.0 - np.dot(t.turn, t.turn))

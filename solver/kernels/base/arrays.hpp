@@ -25,6 +25,7 @@ template <class T>
 struct Array2 {
     T* data = nullptr;
     int64_t rows = 0, columns = 0;
+    auto sizes() { return std::tie(rows, columns); }
 
     operator Array2<const T>() const
         requires(!std::is_const_v<T>)
@@ -41,6 +42,7 @@ template <class T>
 struct Array3 {
     T* data = nullptr;
     int64_t n = 0, rows = 0, columns = 0;
+    auto sizes() { return std::tie(n, rows, columns); }
 
     Array2<T> operator[](int64_t number) const {
         return {all().subspan(number * rows * columns, rows * columns).data(), rows, columns};
@@ -56,6 +58,7 @@ template <class T>
 struct Array4 {
     T* data = nullptr;
     int64_t n = 0, parts = 0, rows = 0, columns = 0;
+    auto sizes() { return std::tie(n, parts, rows, columns); }
 
     Array3<T> operator[](int64_t number) const {
         const int64_t each = parts * rows * columns;
@@ -82,5 +85,8 @@ concept RecordType = requires(T record) {
     T::kMembers;
     record.members();
 };
+/// One of these arrays of more than one dimension.
+template <class T>
+concept TableType = requires(T table) { table.sizes(); };
 
 }  // namespace catenary

@@ -22,15 +22,6 @@ bool any_beyond(std::span<const double> reserve, double margin) {
     return count > 0;
 }
 
-/// Stretch of a link in an answer (n_local,).
-double spread(int64_t link, const Links& links, std::span<const double> answer) {
-    const auto unknowns = links.unknowns[link];
-    const auto weights = links.weights[link];
-    double total = 0.0;
-    for (size_t k = 0; k < unknowns.size(); ++k) total += weights[k] * answer[unknowns[k]];
-    return total;
-}
-
 /// Increase of a link's reserve by a unit of acceleration of its stretch [N s2/m].
 double per_acceleration(const Reserve& law, const Gains& gains) {
     return law.stiffness * gains.position + law.damping * gains.velocity;
@@ -43,12 +34,12 @@ void put_couplings(const LinkRows& rows, int64_t at, const Links& links, int64_t
     const Gains& gains = contacts.gains;
     const double worth = per_acceleration(links.law[link], gains);
     for (int64_t i = 0; i < by_force.rows; ++i) {
-        const double apart = spread(link, links, by_force[i]);
+        const double apart = stretch_of(link, links, by_force[i]);
         rows.reaction(at, i) = worth * apart;
         rows.lift(at, i) = gains.position * apart;
         rows.rise(at, i) = 0.0;
         if (by_slope.columns == 0) continue;
-        const double along = spread(link, links, by_slope[i]);
+        const double along = stretch_of(link, links, by_slope[i]);
         rows.rise(at, i) = gains.velocity * apart + gains.train_speed * gains.position * along;
     }
 }
@@ -63,7 +54,8 @@ double least_reserve(int64_t link, const Contacts& contacts, const Bounds& bound
     for (int64_t i = 0; i < size(contacts.touches); ++i) {
         const Touch& touch = contacts.touches[i];
         if (touch.present == 0.0 || !(std::abs(law.place - touch.x) <= gains.reach)) continue;
-        const double change = worth * spread(link, followed.links, contacts.answers.by_force[i]);
+        const double change =
+            worth * stretch_of(link, followed.links, contacts.answers.by_force[i]);
         left += std::min(change * bounds.push[i], -change * bounds.pull[i]);
     }
     return left;

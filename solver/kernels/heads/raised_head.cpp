@@ -2,25 +2,14 @@
 #include "heads/raised_head.hpp"
 
 #include <array>
-#include <bit>
 #include <stdexcept>
 
 namespace catenary {
 
 namespace {
 
-/// Values of the tables at a height, in the order of their columns.
-struct Columns {
-    double mass, lift, slowing, carried, blown;
-};
-constexpr int64_t kMostColumns = sizeof(Columns) / sizeof(double), kLeastColumns = kMostColumns - 1;
-
-/// As `tables_at` fills it in: zero where tables have no column for the air's lift.
-struct Filled {
-    std::array<double, kMostColumns> numbers{};
-    std::span<double> first(int64_t n) { return part(std::span<double>(numbers), 0, n); }
-    Columns columns() const { return std::bit_cast<Columns>(numbers); }
-};
+/// Columns of the tables; the last one may be missing.
+enum Column { kMass, kLift, kSlowing, kCarried, kBlown, kMostColumns };
 
 }  // namespace
 
@@ -28,7 +17,7 @@ RaisedHead::RaisedHead(const HeadArrays& arrays, const SprungMasses& masses, con
                        const ReducedMechanism& mechanism)
     : SprungHead(arrays, masses, laws), mechanism_(mechanism) {
     const SplineTables& tables = mechanism.tables;
-    if (tables.coefficients.rows < kLeastColumns || tables.coefficients.rows > kMostColumns ||
+    if (tables.coefficients.rows < kBlown || tables.coefficients.rows > kMostColumns ||
         size(tables.breaks) < 2 || tables.coefficients.n != size(tables.breaks) - 1 ||
         tables.coefficients.columns != 4)
         throw std::invalid_argument("a mechanism's tables have other shapes");
@@ -41,18 +30,18 @@ bool RaisedHead::step_free(const Drive& drive) {
     const NewmarkFactors& s = newmark();
     height_ = predicted()[last] - mechanism_.zero - drive.base;
     const double speed = predicted_velocity()[last] - drive.base_velocity;
-    Filled values, slopes;
+    std::array<double, kMostColumns> value{}, slope{};
     const int64_t m = tables.coefficients.rows;
-    tables_at(tables, height_, values.first(m), slopes.first(m));
-    const Columns value = values.columns(), slope = slopes.columns();
+    tables_at(tables, height_, std::span(value).first(m), std::span(slope).first(m));
     double& force = this->force()[last];
-    force += drive.part * (value.lift - mechanism_.weight) + added(drive) - value.slowing * speed -
-             0.5 * slope.mass * speed * speed;
+    force += drive.part * (value[kLift] - mechanism_.weight) + added(drive) -
+             value[kSlowing] * speed - 0.5 * slope[kMass] * speed * speed;
     // The base carries the mechanism along, but less mass than the raised one if parts stay low.
-    force += (value.mass - value.carried) * drive.base_acceleration;
-    force += drive.arm_air + drive.bodies_air * value.blown;
-    matrix()(last, last) += value.mass + s.velocity * (value.slowing + slope.mass * speed) -
-                            s.position * (drive.part * slope.lift + drive.bodies_air * slope.blown);
+    force += (value[kMass] - value[kCarried]) * drive.base_acceleration;
+    force += drive.arm_air + drive.bodies_air * value[kBlown];
+    matrix()(last, last) +=
+        value[kMass] + s.velocity * (value[kSlowing] + slope[kMass] * speed) -
+        s.position * (drive.part * slope[kLift] + drive.bodies_air * slope[kBlown]);
     finish(drive);
     return !(height_ < tables.breaks.front() || height_ > tables.breaks.back());
 }

@@ -62,23 +62,18 @@ void add_bends(const Motion& motion, const Dependents& bends, int64_t begin, int
 
 double energy_of_switching(std::span<const double> displacement, const Links& links,
                            const Dependents& dependents, int64_t begin, int64_t end) {
-    auto stretch_of = [&](const Links& of, int64_t link) {
-        double stretch = 0.0;
-        for (int64_t k = 0; k < of.unknowns.columns; ++k)
-            stretch += of.weights(link, k) * displacement[of.unknowns(link, k)];
-        return stretch;
-    };
     double energy = 0.0;
     part(links.law, begin, end);
     for (int64_t link = begin; link < end; ++link) {
         const Reserve& law = links.law[link];
         if (law.stiffness == 0.0) continue;  // dampers store no energy
-        const double beyond = std::min(law.rest + law.stiffness * stretch_of(links, link), 0.0);
+        const double stretch = stretch_of(link, links, displacement);
+        const double beyond = std::min(law.rest + law.stiffness * stretch, 0.0);
         energy -= law.released * beyond * beyond / (2.0 * law.stiffness);
         if (!(beyond < 0.0)) continue;
         for (int64_t r = dependents.begin[link]; r < dependents.begin[link + 1]; ++r) {
             const Reserve& own = dependents.links.law[r];
-            const double across = stretch_of(dependents.links, r);
+            const double across = stretch_of(r, dependents.links, displacement);
             energy -= 0.5 * own.released * own.stiffness * across * across;
         }
     }

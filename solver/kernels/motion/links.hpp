@@ -30,6 +30,15 @@ struct Dependents {
     CATENARY_SHAPES("*, n+1?")
 };
 
+/// Stretch of a link in displacements, or in an answer, of all unknowns.
+inline double stretch_of(int64_t link, const Links& links, std::span<const double> numbers) {
+    const auto unknowns = links.unknowns[link];
+    const auto weights = links.weights[link];
+    double total = 0.0;
+    for (size_t k = 0; k < unknowns.size(); ++k) total += weights[k] * numbers[unknowns[k]];
+    return total;
+}
+
 /// Reserve of a link [N].
 inline double reserve_of(int64_t link, const Links& links, const Motion& motion) {
     const auto unknowns = links.unknowns[link];

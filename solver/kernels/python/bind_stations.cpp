@@ -35,20 +35,13 @@ py::array_t<int64_t> places(const Layout& layout, const std::string& which) {
                       : which == "beside" ? layout.beside
                       : which == "half"   ? upper(layout.own)
                                           : throw py::key_error(which);
-    const Pieces pieces = layout.pieces();
     py::array_t<int64_t> found({2, layout.size_of(mask)});
     auto at = found.mutable_unchecked<2>();
     py::ssize_t n = 0;
-    for (int i = 0; i < pieces.n(); ++i)
-        for (int j = 0; j < pieces.n(); ++j)
-            for (int kind = 0; kind < kKinds; ++kind) {
-                if (!(mask[i][j] >> kind & 1)) continue;
-                for (int lane = 0; lane < pieces.vector(); ++lane, ++n) {
-                    const Joint joint = joint_of(pieces, i, j, kind, lane);
-                    at(0, n) = joint.row;
-                    at(1, n) = joint.column;
-                }
-            }
+    each_number(layout.pieces(), mask, [&](const Joint& joint, int, int, int) {
+        at(0, n) = joint.row;
+        at(1, n++) = joint.column;
+    });
     return found;
 }
 

@@ -7,6 +7,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -81,17 +82,9 @@ template <class T>
 std::array<int64_t, 1> shape_of(std::span<T> array) {
     return {size(array)};
 }
-template <class T>
-std::array<int64_t, 2> shape_of(const Array2<T>& array) {
-    return {array.rows, array.columns};
-}
-template <class T>
-std::array<int64_t, 3> shape_of(const Array3<T>& array) {
-    return {array.n, array.rows, array.columns};
-}
-template <class T>
-std::array<int64_t, 4> shape_of(const Array4<T>& array) {
-    return {array.n, array.parts, array.rows, array.columns};
+template <TableType T>
+auto shape_of(T array) {
+    return std::apply([](auto... size) { return std::array{size...}; }, array.sizes());
 }
 
 /// Refuse a value of a function or record with these sizes unless it has the wanted shape; `own`
@@ -147,12 +140,9 @@ struct FromArray {
 };
 template <class T>
 struct From<std::span<T>> : FromArray<std::span<T>, T, 1> {};
-template <class T>
-struct From<Array2<T>> : FromArray<Array2<T>, T, 2> {};
-template <class T>
-struct From<Array3<T>> : FromArray<Array3<T>, T, 3> {};
-template <class T>
-struct From<Array4<T>> : FromArray<Array4<T>, T, 4> {};
+template <TableType T>
+struct From<T> : FromArray<T, std::remove_pointer_t<decltype(T::data)>,
+                           std::tuple_size_v<decltype(T().sizes())>> {};
 /// An object of a bound class, which is kept alive.
 template <class T>
 struct From<T*> {
@@ -259,13 +249,13 @@ class Bound {
 };
 
 /// A function over arrays and records.
-class Kernel {
-  public:
-    virtual ~Kernel() = default;
-    virtual std::unique_ptr<Bound> bound(const py::args& first) const = 0;
-    py::object call(const py::args& given) const { return bound(given)->call(py::args()); }
+struct Kernel {
     std::string name;
-    const char* shapes = "";  ///< of the arguments as in shapes.hpp, not owned
+    const char* shapes;  ///< of the arguments as in shapes.hpp, not owned
+    std::function<std::unique_ptr<Bound>(const Kernel&, const py::args&)> bind;
+
+    std::unique_ptr<Bound> bound(const py::args& first) const { return bind(*this, first); }
+    py::object call(const py::args& given) const { return bound(given)->call(py::args()); }
 };
 
 template <class R, class... A>
@@ -322,25 +312,13 @@ class BoundFunction : public Bound {
     Kept kept_;
 };
 
-template <class R, class... A>
-class FunctionKernel : public Kernel {
-  public:
-    explicit FunctionKernel(R (*function)(A...)) : function_(function) {}
-    std::unique_ptr<Bound> bound(const py::args& first) const override {
-        return std::make_unique<BoundFunction<R, A...>>(function_, *this, first);
-    }
-
-  private:
-    R (*function_)(A...);
-};
-
 /// Offer a function in a module as a kernel whose arguments have these `shapes`.
 template <class R, class... A>
 void offer(py::module_& module, const char* name, R (*function)(A...), const char* shapes) {
-    auto kernel = std::make_unique<FunctionKernel<R, A...>>(function);
-    kernel->name = name;
-    kernel->shapes = shapes;
-    module.attr(name) = py::cast(std::unique_ptr<Kernel>(std::move(kernel)));
+    auto bind = [function](const Kernel& of, const py::args& first) -> std::unique_ptr<Bound> {
+        return std::make_unique<BoundFunction<R, A...>>(function, of, first);
+    };
+    module.attr(name) = Kernel{name, shapes, bind};
 }
 
 }  // namespace catenary::python

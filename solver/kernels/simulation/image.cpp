@@ -1,19 +1,14 @@
 // Files of records.
 #include "simulation/image.hpp"
 
-#include <cstdio>
 #include <filesystem>
+#include <fstream>
 
 namespace catenary {
 
 namespace {
 
 constexpr size_t kPage = 4096;
-
-struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, Close>;
 
 /// FNV-1a, by words of eight bytes: it detects damaged files, not forged ones.
 class CheckSum {
@@ -36,23 +31,22 @@ class CheckSum {
 
 class FileOutput {
   public:
-    explicit FileOutput(const std::string& path) : file_(std::fopen(path.c_str(), "wb")) {
+    explicit FileOutput(const std::string& path) : file_(path, std::ios::binary) {
         if (!file_) throw std::runtime_error("it cannot be written");
     }
     void put(const void* data, size_t n) {
         check_.take(data, n);
-        if (std::fwrite(data, 1, n, file_.get()) != n)
-            throw std::runtime_error("it cannot be written to its end");
+        file_.write(static_cast<const char*>(data), static_cast<std::streamsize>(n));
+        if (!file_) throw std::runtime_error("it cannot be written to its end");
     }
     void end() {
         const uint64_t sum = check_.sum();
         put(&sum, sizeof sum);
-        if (std::fflush(file_.get()) != 0)
-            throw std::runtime_error("it cannot be written to its end");
+        if (!file_.flush()) throw std::runtime_error("it cannot be written to its end");
     }
 
   private:
-    File file_;
+    std::ofstream file_;
     CheckSum check_;
 };
 
@@ -62,19 +56,17 @@ class FileInput {
         std::error_code unknown;
         if (!std::filesystem::is_regular_file(path, unknown))
             throw std::runtime_error("there is no such file");
-        file_.reset(std::fopen(path.c_str(), "rb"));
+        file_.open(path, std::ios::binary);
         if (!file_) throw std::runtime_error("it cannot be read");
-        if (std::fseek(file_.get(), 0, SEEK_END) != 0 || (left_ = std::ftell(file_.get())) < 0)
-            throw std::runtime_error("it is no plain file");
-        std::rewind(file_.get());
+        left_ = std::filesystem::file_size(path);
     }
     void get(void* data, size_t n) {
-        if (n > static_cast<size_t>(left_) || std::fread(data, 1, n, file_.get()) != n)
+        if (n > left_ || !file_.read(static_cast<char*>(data), static_cast<std::streamsize>(n)))
             throw std::runtime_error("it ends too early");
-        left_ -= static_cast<long>(n);
+        left_ -= n;
         check_.take(data, n);
     }
-    size_t left() const { return static_cast<size_t>(left_); }
+    size_t left() const { return left_; }
     void end() {
         const uint64_t expected = check_.sum();
         uint64_t sum;
@@ -83,9 +75,9 @@ class FileInput {
     }
 
   private:
-    File file_;
+    std::ifstream file_;
     CheckSum check_;
-    long left_ = 0;
+    size_t left_ = 0;
 };
 
 /// A block as it stands in a file, before its bytes.

@@ -35,18 +35,10 @@ void visit_value(Visitor& visitor, std::span<T>& value) {
     visitor.array(data, n);
     value = {data, n};
 }
-template <class Visitor, class T>
-void visit_value(Visitor& visitor, Array2<T>& value) {
-    visitor.bytes(value.rows);
-    visitor.bytes(value.columns);
-    visitor.array(value.data, value.rows * value.columns);
-}
-template <class Visitor, class T>
-void visit_value(Visitor& visitor, Array3<T>& value) {
-    visitor.bytes(value.n);
-    visitor.bytes(value.rows);
-    visitor.bytes(value.columns);
-    visitor.array(value.data, value.n * value.rows * value.columns);
+template <class Visitor, TableType T>
+void visit_value(Visitor& visitor, T& value) {
+    std::apply([&](auto&... size) { (visitor.bytes(size), ...); }, value.sizes());
+    visitor.array(value.data, value.all().size());
 }
 template <class Visitor, class T>
 void visit_value(Visitor& visitor, std::vector<T>& value) {
@@ -72,7 +64,8 @@ void visit_value(Visitor&, T*&) {}
 template <class Visitor, class T>
 void visit_value(Visitor&, std::vector<T*>&) {}
 template <class Visitor, class T>
-    requires(!RecordType<T>) && std::is_trivially_copyable_v<T> && (!std::is_pointer_v<T>)
+    requires(!RecordType<T> && !TableType<T> && !std::is_pointer_v<T>) &&
+            std::is_trivially_copyable_v<T>
 void visit_value(Visitor& visitor, T& value) {
     visitor.bytes(value);
 }

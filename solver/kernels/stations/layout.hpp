@@ -59,17 +59,24 @@ constexpr Joint joint_of(const Pieces& pieces, int i, int j, int kind, int lane)
     return found.row < pieces.unknowns && found.column < pieces.unknowns ? found : Joint{};
 }
 
-/// The mask of a block that joins each row and column for which `joins(row, column)` is true.
-template <class Joins>
-constexpr Mask mask_of(const Pieces& pieces, const Joins& joins) {
-    Mask mask{};
+/// Call `function(joint, i, j, kind)` for each number of a packed block, in their order.
+template <class Function>
+constexpr void each_number(const Pieces& pieces, const Mask& mask, const Function& function) {
     for (int i = 0; i < pieces.n(); ++i)
         for (int j = 0; j < pieces.n(); ++j)
             for (int kind = 0; kind < kKinds; ++kind)
-                for (int lane = 0; lane < pieces.vector(); ++lane) {
-                    const Joint at = joint_of(pieces, i, j, kind, lane);
-                    if (at.row >= 0 && joins(at.row, at.column)) mask[i][j] |= 1 << kind;
-                }
+                for (int lane = 0; mask[i][j] >> kind & 1 && lane < pieces.vector(); ++lane)
+                    function(joint_of(pieces, i, j, kind, lane), i, j, kind);
+}
+
+/// The mask of a block that joins each row and column for which `joins(row, column)` is true.
+template <class Joins>
+constexpr Mask mask_of(const Pieces& pieces, const Joins& joins) {
+    Mask mask{}, all;
+    for (auto& row : all) row.fill(15);
+    each_number(pieces, all, [&](const Joint& at, int i, int j, int kind) {
+        if (at.row >= 0 && joins(at.row, at.column)) mask[i][j] |= 1 << kind;
+    });
     return mask;
 }
 

@@ -65,33 +65,29 @@ int64_t Line::start_of(const Work& work, int64_t station) const {
     return is_end ? n_solved_ : work.factored.places.starts[station] * scenes_;
 }
 
+/// Put the unknowns of a station in the order of another station type, zero for those it lacks.
+void Line::reorder(int from, int to, const double* given, double* found) const {
+    const int8_t* place = &place_[(from * station_types_.size() + to) * kMostUnknowns];
+    for (size_t u = 0; u < station_types_[to].size(); ++u)
+        for (int s = 0; s < scenes_; ++s)
+            *found++ = place[u] < 0 ? 0.0 : given[place[u] * scenes_ + s];
+}
+
 void Line::convert(int from, int to, Station& station) const {
     if (from == to) return;
     Station given;  // all of it takes longer to copy than what there is to convert
     std::copy_n(station.unknowns, station_types_[from].size() * scenes_, given.unknowns);
-    const int8_t* place = &place_[(from * station_types_.size() + to) * kMostUnknowns];
-    double* unknown = station.unknowns;
-    for (size_t u = 0; u < station_types_[to].size(); ++u)
-        for (int s = 0; s < scenes_; ++s)
-            *unknown++ = place[u] < 0 ? 0.0 : given.unknowns[place[u] * scenes_ + s];
+    reorder(from, to, given.unknowns, station.unknowns);
 }
 
 /// Fill in a station in the order of another station type.
 void Line::outside(const Work& work, int64_t station, int station_type, Outside& found) const {
     const Product& product = work.product;
-    const int64_t at = product.first + station;
-    const int8_t* place =
-        &place_[(product.places.station_type[at] * station_types_.size() + station_type) *
-                kMostUnknowns];
-    const double* position = product.factor + product.places.starts[at] * scenes_;
-    const double* velocity = product.velocity + product.places.starts[at] * scenes_;
-    const bool is_damped = kernels_[station_type]->rows.is_damped;
-    for (int u = 0, to = 0; u < static_cast<int>(station_types_[station_type].size()); ++u)
-        for (int s = 0; s < scenes_; ++s, ++to) {
-            const int from = place[u] * scenes_ + s;
-            found.position[to] = place[u] < 0 ? 0.0 : position[from];
-            if (is_damped) found.velocity[to] = place[u] < 0 ? 0.0 : velocity[from];
-        }
+    const int64_t at = product.first + station, start = product.places.starts[at] * scenes_;
+    const int there = product.places.station_type[at];
+    reorder(there, station_type, product.factor + start, found.position);
+    if (kernels_[station_type]->rows.is_damped)
+        reorder(there, station_type, product.velocity + start, found.velocity);
 }
 
 /// Fill in displacement and velocity of the stations beside a chain for its products, where these

@@ -182,6 +182,7 @@ class Line {
     }
     struct Way;
     bool alike(int one, int other) const;
+    void reorder(int from, int to, const double* given, double* found) const;
     void convert(int from, int to, Station&) const;
     void outside(const Work&, int64_t station, int station_type, Outside&) const;
     void put_outside(const Work&, Chain&, int station_type, int step) const;

@@ -23,16 +23,10 @@ constexpr Joints<N> joints_of(const Pieces& pieces, const Mask& mask) {
     Joints<N> found;
     for (int column = 0; column < pieces.unknowns; ++column) {
         int at = 0;
-        for (int i = 0; i < pieces.n(); ++i)
-            for (int j = 0; j < pieces.n(); ++j)
-                for (int kind = 0; kind < kKinds; ++kind) {
-                    if (!(mask[i][j] >> kind & 1)) continue;
-                    for (int lane = 0; lane < pieces.vector(); ++lane, ++at) {
-                        const Joint joint = joint_of(pieces, i, j, kind, lane);
-                        if (joint.row >= 0 && joint.column == column)
-                            found.of[found.n++] = {joint, at, i != j};
-                    }
-                }
+        each_number(pieces, mask, [&](const Joint& joint, int i, int j, int) {
+            if (joint.row >= 0 && joint.column == column) found.of[found.n++] = {joint, at, i != j};
+            ++at;
+        });
     }
     return found;
 }

@@ -9,6 +9,7 @@ import numpy as np
 
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.linear.stations.sections import Sections, places_of
+from catenary.solver.model.alike import numbered
 from catenary.solver.model.entries import iterate_sums
 from catenary.solver.model.model import Model
 
@@ -35,10 +36,9 @@ class StationRows(NamedTuple):
 
     def part(self, stations: slice) -> StationRows:
         """The rows of a range of the stations."""
-        used, first, kinds = np.unique(self.kinds[stations], return_index=True, return_inverse=True)
-        order = np.argsort(first)
-        kinds = np.argsort(order).astype(np.int32)[kinds]
-        return StationRows(kinds, first[order], self.blocks[:, used[order]])
+        own = self.kinds[stations]
+        first, kinds = numbered(own)
+        return StationRows(kinds, first, self.blocks[:, own[first]])
 
 
 class LikeRows:
@@ -59,10 +59,7 @@ class LikeRows:
         # Rows at the ends may be cut off, so that they are kinds of their own.
         marks[:1] += np.uint64(1)
         marks[-1:] += np.uint64(2)
-        _, first, kinds = np.unique(marks, return_index=True, return_inverse=True)
-        order = np.argsort(first)
-        self._chosen = first[order]
-        self._kinds = np.argsort(order).astype(np.int32)[kinds]
+        self._chosen, self._kinds = numbered(marks)
 
     def sum_of(
         self, of: Coefficients, columns: tuple[int, int], held_diagonal: float = 0.0

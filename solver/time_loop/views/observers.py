@@ -83,7 +83,6 @@ class StepView:
     columns : slice of a row for each channel, by name
     times, rows : (k,) times [s] and (k, n) rows of all steps of the view; those of the last step
         alone if not given
-    node_uplift : () -> (n owned nodes,) vertical displacement [m], up positive; not collective
     node_motion : (name of an unknown, whether its rate, indices of owned nodes or all) ->
         (n nodes,) [m], [m/s] or [-], [1/s], zero for nodes without it; not collective
     wire_tension : () -> (n_nodes,) tension of the wires ahead of all nodes [N], the same array as
@@ -106,7 +105,6 @@ class StepView:
     time: float
     row: np.ndarray
     columns: dict[str, slice]
-    node_uplift: Callable[[], np.ndarray]
     node_motion: NodeMotion
     wire_tension: Callable[[], np.ndarray]
     pantograph_places: Callable[[], np.ndarray]

@@ -121,7 +121,6 @@ class Showing:
             time=0.0,
             row=self._row,
             columns=self.layout.columns,
-            node_uplift=lambda: self._moved.displacement[self._node_rows],
             node_motion=self._node_motion,
             wire_tension=lambda: self._tension,
             pantograph_places=self._pantograph_places,
@@ -232,11 +231,6 @@ class Showing:
             self.motion.late(followed=True)
         self._view.move_to(step, times, rows)
         return self._view
-
-    @cached_property
-    def _node_rows(self) -> np.ndarray:
-        """Rows of the heights of the rank's nodes."""
-        return self._model.dofs(self._owned_nodes) - self._line.ownership.first
 
     def _node_motion(self, name: str, rate: bool, among: np.ndarray | None = None, /) -> np.ndarray:
         """One unknown of the rank's nodes, or its rate, zero for nodes without it."""

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg
 from scipy.interpolate import CubicSpline
 
 from catenary import RunBroken
+from catenary.mbs.head.laws import Law
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
 from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.mechanism.multibody_pantograph import Head
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
 
 EPS = np.finfo(float).eps
 DT, BETA, GAMMA = 2e-3, 0.3, 0.55
@@ -28,7 +33,7 @@ FRAME = ReducedMechanism(
     20.0 * np.ones_like(HEIGHTS),
     name="tall",
 )
-RAISING = RaisingData(FRAME, 7.8, 6000.0, 26.0, 76.0, 0.08, base_height=3.6)
+RAISING = RaisingData(FRAME, Head(7.8, 6000.0, 26.0, 76.0, 0.08), base_height=3.6)
 
 
 def newmark(
@@ -114,7 +119,7 @@ def test_a_mechanism_beyond_its_reach_says_where_and_when() -> None:
 def test_prediction_and_compliance_are_what_a_step_does_for_any_forces() -> None:
     """A step is linear in the forces of all strips: differences of steps are exact."""
     strips = Strips(2, 0.5, 1.6, Suspension(1.2, 9000.0, 30.0), Turning(0.4, 300.0, 2.0))
-    data = RaisingData(FRAME, 7.8, 6000.0, 26.0, 76.0, 0.08, 3.6, strips)
+    data = RaisingData(FRAME, Head(7.8, 6000.0, 26.0, 76.0, 0.08), 3.6, strips)
     ends, heads = [], []
     for forces in ([0.0, 0.0], [40.0, 0.0], [0.0, 40.0]):
         pantograph = RaisingPantograph(data, Stepping(0.0, DT, BETA, GAMMA))
@@ -141,6 +146,40 @@ def test_placed_with_a_velocity_all_masses_have_it_and_dampers_between_them_are_
     base = 5.5 + 120.0 / 7000.0 + 120.0 / 15500.0
     expected = (120.0 + 160.0 * (base - 5.5) - 100.0 * 0.3) / 6.0
     assert pantograph.state()[6:] == pytest.approx([0, 0, expected], abs=4 * EPS * 15500 * 5.5 / 6)
+
+
+def test_masses_start_with_the_accelerations_of_springs_and_laws() -> None:
+    """Newton's law of each mass; springs of 15 500 N/m at 5.4 m leave their round-off."""
+    laws = (
+        Law(0, 3, False, (-1.0, 0.0, 1.0), (-300.0, 0.0, 500.0)),
+        Law(1, 2, True, (-1.0, 0.0, 1.0), (-40.0, 0.0, 40.0)),
+        Law(2, 3, True, (-1.0, 0.1, 1.0), (-10.0, 1.0, 91.0)),
+    )
+    pantograph = LumpedPantograph(replace(THREE, laws=laws), 120.0, 5.5, Stepping(0.0, DT))
+    pantograph.place(5.4, velocity=0.3)
+    base = 5.5 + 120.0 / 7000.0 + 120.0 / 15500.0
+    on_last = 120.0 + 160.0 * (base - 5.4) - 100.0 * 0.3 - (1.0 + 100.0 * 0.2)
+    # The first law pulls from 0.1 m below, by its slope there; the second finds no rate between.
+    expected = [300.0 * 0.1 / 7.5, 0.0, on_last / 6.0]
+    assert pantograph.state()[6:9] == pytest.approx(expected, abs=8 * EPS * 15500 * 5.5 / 6)
+    assert np.array_equal(pantograph.state()[:6], [5.4] * 3 + [0.3] * 3)
+
+
+def test_a_mechanism_starts_with_the_acceleration_of_its_equation() -> None:
+    base = BaseMotion(VehicleMotion((Harmonic(0.02, 2.0, 0.3),)), 0.0, 50.0)
+    pantograph = RaisingPantograph(RAISING, Stepping(0.0, DT, base=base))
+    pantograph.place(5.0, velocity=0.2)
+    moved = base.vertical(0.0)
+    height, speed = 5.0 - 3.6 - 0.08 - moved.place, 0.2 - moved.velocity
+    mass, lift, slowing = (
+        CubicSpline(HEIGHTS, values) for values in (FRAME.masses, FRAME.lifts, FRAME.dampings)
+    )
+    force = lift(height) - 76.0 - slowing(height) * speed - 0.5 * mass(height, 1) * speed**2
+    force += (mass(height) - 20.0) * moved.acceleration
+    within = 8 * EPS * 6000 * 5.0 / 7.8
+    assert pantograph.state()[4:] == pytest.approx([0.0, force / mass(height)], abs=within)
+    with pytest.raises(RunBroken, match="At 0 s the arm of pantograph 'tall' is at 2"):
+        pantograph.place(5.7)
 
 
 @pytest.mark.parametrize("suspended", [False, True])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from body_mechanics import from_vector, tabulated
+from driven_angle import DrivenAngle
 from measuring import check
 from scipy.spatial.transform import Rotation
 
@@ -50,9 +51,10 @@ JOINTS: list[Joint] = [
     PointOnCurve("curve", "b", (-2.0, 0.0, 1.0, 3.0), (0.0, 1.0, 0.5, 0.2), (0, 1, 0, 2), AT_J),
     PrescribedPoint("prescribed point", "b", TABLE, AT_J, AXIS_I),
     PrescribedPoint("steady point", "a", steady(0.3, 2.0), AT_I, AXIS_J),
-    PrescribedAngle("prescribed angle", "a", "b", TABLE, (0, 1, 0), (1, 0, 0), (0, 0, 1)),
+    PrescribedAngle("prescribed angle", "a", "b", 0.3, (0, 1, 0), (1, 0, 0), (0, 0, 1)),
+    DrivenAngle("driven angle", "a", "b", TABLE, (0, 1, 0), (1, 0, 0), (0, 0, 1)),
 ]
-N_ROWS = (3, 5, 5, 2, 5, 4, 6, 6, 2, 1, 1, 1)
+N_ROWS = (3, 5, 5, 2, 5, 4, 6, 6, 2, 1, 1, 1, 1)
 
 
 def some_motion(seed: int = 5) -> Motion:

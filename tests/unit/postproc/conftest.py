@@ -276,7 +276,6 @@ class March:
             time=t,
             row=row,
             columns=columns,
-            node_uplift=lambda: self.wave(t, nodes),
             node_motion=lambda name, rate, among=None: self.motion(
                 t, nodes if among is None else nodes[among], name, rate
             ),

@@ -344,7 +344,7 @@ def test_an_observer_that_looks_at_each_state_is_shown_each(mesh: LineMesh) -> N
             return step + 1
 
         def observe(self, view: StepView) -> None:
-            shown.append(float(np.abs(view.node_uplift()).max()))
+            shown.append(float(np.abs(view.node_motion("w", False)).max()))
 
     with march:
         march.run([by_blocks, Looking()])

@@ -54,7 +54,7 @@ class Looking(Observer):
                 view.line_state()
         if view.step % EVERY == 0:
             self.energies.append(view.energies())
-            self.uplift.append(view.node_uplift().copy())
+            self.uplift.append(view.node_motion("w", False).copy())
             motion = [view.node_motion(n, rate) for n in ("w", "theta_y") for rate in (False, True)]
             self.motion.append(np.array(motion))
             self.places.append(view.pantograph_places())

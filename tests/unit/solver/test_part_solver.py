@@ -11,7 +11,8 @@ from petsc4py import PETSc
 from repeating_line import alike, rows_of
 from scipy import sparse
 
-from catenary.solver.linear.petsc_solvers import PartSolver, Wrapped
+from catenary.solver.linear.petsc_solvers import PartSolver, Wrapped, allows_own_factors
+from catenary.solver.linear.station_factors import station_factors
 from catenary.solver.linear.stations.station_layout import Layout
 
 N_STATIONS = 12
@@ -39,8 +40,9 @@ def test_all_factors_give_the_same_answer(option: str | None, hurries: bool) -> 
     if option is not None:
         options["march_pc_type"] = option
     try:
-        by_stations = Layout((4,)), alike(N_STATIONS, 4), rows_of(matrix)
-        solver = PartSolver(lambda: matrix, slice(0, N_STATIONS), True, True, *by_stations)
+        factors = station_factors(rows_of(matrix), Layout((4,)), alike(N_STATIONS, 4))
+        own = factors if allows_own_factors(is_whole=True) else None
+        solver = PartSolver(lambda: matrix, True, True, own)
     finally:
         options.delValue("march_pc_type")
     if hurries:
@@ -62,12 +64,13 @@ def test_a_solver_that_nobody_destroyed_does_not_crash_the_end_of_python() -> No
         "from catenary.solver.linear.stations.station_layout import Layout; "
         "from catenary.solver.linear.stations.station_rows import StationRows; "
         "from catenary.solver.linear.petsc_solvers import PartSolver; "
+        "from catenary.solver.linear.station_factors import station_factors; "
         "whole = sparse.identity(8).tobsr((4, 4)); "
         "blocks = np.eye(4) * np.array([[0, 0], [1, 1], [0, 0]])[..., None, None]; "
         "rows = StationRows(np.arange(2, dtype=np.int32), np.arange(2), blocks); "
         "stations = Sections(4 * np.arange(3), np.zeros(2, int), ((0, 1, 2, 3),), 4); "
-        "by_stations = Layout((4,)), stations, rows; "
-        "kept = PartSolver(lambda: whole, slice(0, 2), True, True, *by_stations); "
+        "factors = station_factors(rows, Layout((4,)), stations); "
+        "kept = PartSolver(lambda: whole, True, True, factors); "
         "kept.itself = kept"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=240)

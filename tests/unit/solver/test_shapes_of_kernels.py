@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from repeating_line import layout, line, station_factors, station_product
 
+from catenary.mbs.interface import affine
 from catenary.solver.contact.followed_links import no_links
-from catenary.solver.contact.line_response import LineResponse, affine
+from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem, room_for
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
 from catenary.solver.kernels import native

@@ -15,13 +15,13 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.integrators import slow_path
+from catenary.solver.integrators.slow_path import single_steps_of
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
 from catenary.solver.time_loop.march import Outcome
-from catenary.solver.time_loop.single_steps import single_steps_of
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import RUN, Channel
 
