@@ -128,3 +128,18 @@ def test_tensions_at_clamps_stay_in_balance() -> None:
         np.testing.assert_allclose(messenger.tension_at(outside), messenger.tension, rtol=1e-12)
         both = messenger.tension_at(middle) + tension
         np.testing.assert_allclose(both, messenger.tension, rtol=1e-12)
+
+
+def test_sections_side_by_side_lose_tension_each_by_itself() -> None:
+    """In an overlap stitch wires of both sections take as much over the same stretches."""
+    changes = ["line.overlap.first_span=12", "line.overlap.rise_m=0.6"]
+    line = line_of(load_scene("re330_stitched", changes))
+    for own, other in (("", "_next"), ("_next", "")):
+        name, carrier = f"stitch_wire{own}", f"messenger_wire{own}"
+        after = line.with_shares({name: 0.6})
+        stitch, messenger = after.wire(name), after.wire(carrier)
+        middle = np.array([0.5 * (piece.x[0] + piece.x[-1]) for piece in stitch.pieces])
+        both = messenger.tension_at(middle) + stitch.tension
+        np.testing.assert_allclose(both, messenger.tension, rtol=1e-12)
+        unchanged = after.wire(f"messenger_wire{other}"), line.wire(f"messenger_wire{other}")
+        np.testing.assert_array_equal(*(wire.tension_at(middle) for wire in unchanged))
