@@ -27,6 +27,11 @@ def lost(wire: str, share: float = 0.9) -> str:
     return f"incidents=[{{type='tension_loss',at_s=1.0,wire='{wire}',share={share}}}]"
 
 
+def wrong(*factors: tuple[str, float]) -> str:
+    listed = (f"{{type='wrong_tension',wire='{wire}',factor={factor}}}" for wire, factor in factors)
+    return f"defects=[{','.join(listed)}]"
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_any_part_of_the_line_may_have_damping_of_its_own(case: str) -> None:
     for name in line_of(load_scene(case, [])).components:
@@ -104,6 +109,33 @@ def test_a_wire_keeps_more_tension_than_those_clamped_to_it_take() -> None:
     load_scene("re330_stitched", [lost("messenger_wire", least + 0.01)])
     with pytest.raises(SceneError, match=f"it must be greater than {least:.3g}"):
         load_scene("re330_stitched", [lost("messenger_wire", least - 0.01)])
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ([wrong(("stitch_wire", 2.0))], r"defects.0.factor is 2 .*would then take 22000 N of its"),
+        (
+            [wrong(("stitch_wire", 1.5), ("messenger_wire", 0.6))],
+            r"defects.1.factor is 0.6 .*would then take 16500 N of its 12600 N",
+        ),
+        (
+            [wrong(("messenger_wire", 0.6)), lost("messenger_wire", 0.7)],
+            r"incidents.0.share is 0.7 .*would then take 11000 N of its 8820 N",
+        ),
+        ([wrong(("stitch_wire", 0.8), ("messenger_wire", 0.6)), lost("stitch_wire", 0.5)], None),
+    ],
+)
+def test_a_wire_keeps_more_than_clamped_ones_take_whatever_befalls_both(
+    changes: list[str], sentence: str | None
+) -> None:
+    changes = ["line.stitch_wire.tension_N=11000", *changes]
+    if sentence is None:
+        load_scene("re330_stitched", changes)
+        return
+    with pytest.raises(SceneError, match=sentence) as refused:
+        load_scene("re330_stitched", changes)
+    assert len(refused.value.faults) == 1
 
 
 def test_a_second_contact_wire_is_as_slow_as_the_first() -> None:
