@@ -12,6 +12,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.model.link_directions import dropper_directions
 from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.problem.defects import HardSpot
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.potential import Potential
 from catenary.solver.statics.changed_line.rest_nearby import RestNearby, StiffLine, where
@@ -49,7 +50,8 @@ def hang(
             "take smaller errors"
         )
     wanted = cut.dropper_lengths
-    model = build(problem, mesh, length, form=form, cut_lengths=wanted)
+    springless = _without_springs(problem)
+    model = build(springless, mesh, length, form=form, cut_lengths=wanted)
     potential = Potential(cut, model, form, form.dropper_length + errors)
     if stiff is not None and not same_matrices(stiff.model, model):
         stiff = None
@@ -62,13 +64,23 @@ def hang(
         )
     _refuse_slack_wires(model, rest.form)
     moved_stops = rest.form.arm_raised.any()
-    if not (effects.needs_form(problem) or model.droppers_bend or rest.gap.any() or moved_stops):
+    depends = effects.needs_form(problem) or model.droppers_bend or springless is not problem
+    if not (depends or rest.gap.any() or moved_stops):
         model.form = rest.form
         assert model.droppers is not None
         if all(map(np.array_equal, dropper_directions(model), model.droppers.direction)):
             return model, rest.form  # no matrix depends on the shape
     hung = build(problem, mesh, length, form=rest.form, gap=rest.gap, cut_lengths=wanted)
     return hung, rest.form
+
+
+def _without_springs(problem: Problem) -> Problem:
+    """The problem without the springs of hard spots, which carry nothing at rest."""
+    defects = tuple(
+        replace(defect, stiffness=0.0) if isinstance(defect, HardSpot) else defect
+        for defect in problem.defects
+    )
+    return problem if defects == tuple(problem.defects) else replace(problem, defects=defects)
 
 
 def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
