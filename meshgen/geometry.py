@@ -101,9 +101,9 @@ def _check_heights(line: Line, group: Droppers) -> None:
         over, under = (name.replace("_", " ") for name in (group.upper, group.lower))
         raise InputError(
             f"at the dropper at {at - masts[span - 1]:g} m of span {span} the {over} is expected "
-            f"to hang {-length[short[0]]:.3f} m below the {under}: raise the encumbrance "
-            f"({upper.top - lower.top:g} m), raise the {over}'s tension or lower the rise of the "
-            "transition spans or of the overlap"
+            f"to hang {-length[short[0]]:.3f} m below the {under}: raise the {over} "
+            f"({upper.top - lower.top:g} m above the {under} at the supports) or its tension, or "
+            "lower the rise of the transition spans or of the overlap"
         )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from catenary.meshgen.hardware import Clamps, Droppers, Fittings, SteadyArms, Supports
 from catenary.meshgen.track import Curve, Spans, read_only
-from catenary.meshgen.wires import SAME_PLACE, End, Profile, Role, Wire
+from catenary.meshgen.wires import SAME_PLACE, Profile, Role, Wire
 
 
 class DropperPlace(NamedTuple):
@@ -175,17 +175,14 @@ class Line(Spans):
 
         A wire that is clamped to others takes from them its own share of the tension before.
         """
-        clamped = {
-            (piece.x[0], piece.x[-1], wire.tension): shares.get(wire.name, 1.0)
-            for wire in self.wires
-            for piece in wire.pieces
-            if End.CLAMPED in piece.ends
-        }
         wires = (
             replace(
                 wire,
                 tension=shares.get(wire.name, 1.0) * wire.tension,
-                taken=tuple((*part[:2], clamped.get(part, 1.0) * part[2]) for part in wire.taken),
+                taken=tuple(
+                    part._replace(tension=shares.get(part.by, 1.0) * part.tension)
+                    for part in wire.taken
+                ),
             )
             for wire in self.wires
         )

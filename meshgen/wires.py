@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -166,6 +167,20 @@ class Profile:
         return np.array([self.sag_x, self.sag])
 
 
+class Taken(NamedTuple):
+    """Part of a wire's tension that another wire, which is clamped to it, carries in its place.
+
+    start, end : stretch over which it does [m]
+    tension : of the other wire [N]
+    by : name of the other wire
+    """
+
+    start: float
+    end: float
+    tension: float
+    by: str
+
+
 @dataclass(frozen=True)
 class Wire(Conductor):
     """A wire of a line.
@@ -176,8 +191,8 @@ class Wire(Conductor):
     role : contact, messenger, auxiliary or stitch wire
     pieces : where it runs, one piece or several by ascending x that do not overlap
     profile : wanted heights at the lower ends of its droppers; None without such droppers
-    taken : stretches (from [m], to [m], tension [N]) over which a wire clamped to it carries this
-        part of its tension; parts add up where stretches overlap
+    taken : stretches over which wires clamped to it carry a part of its tension; parts add up
+        where stretches overlap
     worn : stretches (from [m], to [m], share [-]) over which it has lost a share of its section,
         from below
     """
@@ -186,7 +201,7 @@ class Wire(Conductor):
     role: Role
     pieces: tuple[Piece, ...]
     profile: Profile | None = None
-    taken: tuple[tuple[float, float, float], ...] = ()
+    taken: tuple[Taken, ...] = ()
     worn: tuple[tuple[float, float, float], ...] = ()
 
     @classmethod
@@ -206,9 +221,10 @@ class Wire(Conductor):
         """Tension at positions ``x`` [m], shape as ``x`` [N]."""
         tension = np.full(np.shape(x), self.tension)
         if self.taken:
-            for at, change in zip(np.array(self.taken).T[:2], (-1.0, 1.0), strict=True):
+            parts = np.array([part[:3] for part in self.taken])
+            for at, change in zip(parts.T[:2], (-1.0, 1.0), strict=True):
                 order = np.argsort(at, kind="stable")
-                less = np.cumsum(np.array(self.taken)[order, 2])
+                less = np.cumsum(parts[order, 2])
                 passed = np.searchsorted(at[order], x, side="right")
                 tension += change * np.where(passed > 0, less[np.maximum(passed - 1, 0)], 0.0)
         return tension
@@ -216,7 +232,7 @@ class Wire(Conductor):
     @property
     def most_taken(self) -> float:
         """Largest part of its tension that wires clamped to it carry at one place [N]."""
-        starts = np.array([start for start, _, _ in self.taken])
+        starts = np.array([part.start for part in self.taken])
         return self.tension - float(np.min(self.tension_at(starts), initial=self.tension))
 
     def radial_force(self, x: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import itertools
 import math
 import re
 import tempfile
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -193,8 +194,11 @@ def _with_usual_values(body: str) -> str:
 
 def _with_files(body: str, spans: Sequence[float], droppers: bool) -> str:
     """The text with the planner's tables in place of its own spans and droppers."""
-    least = _START + _SHORT_RUN_IN + _SHORT_JUDGED + _AFTER
     n, places = len(spans), [0.0, *itertools.accumulate(spans)]
+    # The last pantograph starts where a lone one does.
+    begin = places[min(_START, n)] + _farthest_behind(body)
+    start = next((i for i in range(_START, n) if places[i] >= begin), n)
+    least = start + _SHORT_RUN_IN + _SHORT_JUDGED + _AFTER
     if n < least:
         raise InputError(
             f"--spans has {n} spans; a new case needs {least}, to run in, judge and run out"
@@ -208,18 +212,28 @@ def _with_files(body: str, spans: Sequence[float], droppers: bool) -> str:
         if "\n[line.auxiliary_wire.dropper]" in body:  # hangs evenly, as spans differ
             even = {"positions_m": None, "count": "5", "spacing_m": "10.0"}
             body = _edited(body, "line.auxiliary_wire.dropper", even)
-    first = min(_START + _RUN_IN, n // 3 + 1)
+    first = min(start + _RUN_IN, start - _START + n // 3 + 1)
     last = min(first + _JUDGED, n - _AFTER)
-    body = _edited(body, "train", {"start_m": f"{places[_START]:.10g}"})
+    body = _edited(body, "train", {"start_m": f"{places[start]:.10g}"})
     judged = {"from_m": f"{places[first]:.10g}", "to_m": f"{places[last]:.10g}"}
     body = _edited(body, "evaluation", judged)
-    short = _START + _SHORT_RUN_IN
+    short = start + _SHORT_RUN_IN
+    overlap = f'"line.overlap.first_span" = {short}\n' if "\n[line.overlap]" in body else ""
     test = (
-        f'[test]\n"line.n_spans" = {least}\n'
+        f'[test]\n"line.n_spans" = {least}\n{overlap}'
         f'"evaluation.from_m" = {places[short]:.10g}\n'
         f'"evaluation.to_m" = {places[short + _SHORT_JUDGED]:.10g}\n'
     )
     return body.partition("[test]")[0].rstrip() + "\n\n" + test
+
+
+def _farthest_behind(body: str) -> float:
+    """Distance of the last pantograph behind the first one [m]."""
+    train = tomllib.loads(body).get("train")
+    listed = train.get("pantographs") if isinstance(train, dict) else None
+    # What is no table or no number is refused when the new case is loaded.
+    places = [place.get("behind_m") for place in listed or [] if isinstance(place, dict)]
+    return max((float(x) for x in places if isinstance(x, int | float)), default=0.0)
 
 
 def _edited(body: str, table: str, values: Mapping[str, str | None]) -> str:

@@ -12,6 +12,7 @@ from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import line_of, resolved
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.problem.irregularities import LengthErrors
 
 FORWARD, BACKWARD = DIRECTIONS = ("forward", "backward")
@@ -191,9 +192,11 @@ def _numbers(line: Line) -> Iterable[tuple[int, int]]:
 
 
 def _other_number(line: Line, span: int, dropper: int) -> tuple[int, int]:
-    """The numbers of a dropper from the other end."""
-    there = line.droppers_of_span(span - 1).size
-    return line.n_spans + 1 - span, there + 1 - dropper
+    """The numbers of a dropper from the other end: of several at one place each remains that of
+    its wires, the first of which comes first from either end."""
+    place = line.dropper_of_span(span, dropper)
+    before = int((line.droppers_of_span(span - 1) > place.x + SAME_PLACE).sum())
+    return line.n_spans + 1 - span, before + place.nth + 1
 
 
 def _turn_dropper(table: dict[str, Any], line: Line) -> None:

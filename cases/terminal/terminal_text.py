@@ -292,7 +292,7 @@ def _registration_text(data: Mapping[str, np.ndarray], wires: Sequence[str]) -> 
 def _wire_text(wire: Wire, lengths: np.ndarray | None) -> str:
     """Tension of a wire, and what is special about its pieces; ``lengths`` of clamped ones [m]."""
     text = f"{wire.name}: tension {wire.tension:g} N"
-    shares = sorted({less for _, _, less in wire.taken})
+    shares = sorted({part.tension for part in wire.taken})
     if shares:
         left = " or ".join(f"{wire.tension - less:g}" for less in shares)
         text += f", {left} N beside wires that are clamped to it"

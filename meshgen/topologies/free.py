@@ -17,7 +17,7 @@ from catenary.base.errors import InputError
 from catenary.meshgen.hardware import Clamps, Droppers, SteadyArms, Supports
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.line_data import FreeDroppers, FreeLink, FreeWire, LineData
-from catenary.meshgen.wires import Conductor, End, Piece, Profile, Role, Wire
+from catenary.meshgen.wires import Conductor, End, Piece, Profile, Role, Taken, Wire
 
 # Only for the first guess of a sag; equilibrium uses the scene's value [m/s2].
 GRAVITY = 9.81
@@ -146,10 +146,10 @@ def _end_clamps(wires: tuple[FreeWire, ...]) -> tuple[Clamps, ...]:
     return tuple(found)
 
 
-def _taken(name: str, wires: tuple[FreeWire, ...]) -> tuple[tuple[float, float, float], ...]:
+def _taken(name: str, wires: tuple[FreeWire, ...]) -> tuple[Taken, ...]:
     """Stretches over which wires that are clamped to a wire carry a part of its tension."""
     taken = [
-        (*stretch, wire.conductor.tension)
+        Taken(*stretch, wire.conductor.tension, wire.name)
         for wire in wires
         if name in wire.bearers
         for stretch in wire.stretches

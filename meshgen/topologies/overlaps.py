@@ -102,7 +102,11 @@ class _Sections:
             pieces = tuple(part for piece in wire.pieces for part in self._parts(piece))
             if not pieces:
                 continue
-            taken = tuple(part for part in wire.taken if self._inside(part[0], part[1]))
+            taken = tuple(
+                part._replace(by=self._name(part.by))
+                for part in wire.taken
+                if self._inside(part.start, part.end)
+            )
             profile = wire.profile
             if profile is not None:
                 profile = self._risen(profile)

@@ -17,7 +17,7 @@ class DropperRow(NamedTuple):
 
     Attributes
     ----------
-    span, number : from 1, the latter of the droppers in this span that carry the same wire
+    span, number : by which a scene names it, from 1, the latter along the track over all wires
     position, x : from the span's left support and along the track [m]
     length, force : [m], at rest [N]
     upper, lower : names of the wires that it hangs from and carries
@@ -46,14 +46,12 @@ def dropper_table(results: Results) -> list[DropperRow]:
     masts = results.line("support_x")
     length, force = results.static("dropper_length"), results.static("dropper_force")
     wires, names = results.dropper_wires(), list(results.roles)
-    number = np.zeros(x.size, dtype=np.int64)
-    for carried in np.unique(wires[:, 1]):
-        own = wires[:, 1] == carried
-        number[own] = _numbers_in_spans(span[own], x[own])
+    order = _order(results)
+    first = np.searchsorted(span[order], span)  # of each dropper's span, along the track
     return [
         DropperRow(
             int(span[i]) + 1,
-            int(number[i]),
+            along - int(first[i]) + 1,
             float(x[i] - masts[span[i]]),
             float(x[i]),
             float(length[i]),
@@ -61,25 +59,13 @@ def dropper_table(results: Results) -> list[DropperRow]:
             names[wires[i, 0]],
             names[wires[i, 1]],
         )
-        for i in _order(results)
+        for along, i in enumerate(order)
     ]
 
 
 def _order(results: Results) -> list[int]:
     """Numbers of the droppers in order of x."""
     return [int(i) for i in np.argsort(results.line("dropper_x"), kind="stable")]
-
-
-def _numbers_in_spans(span: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Count of the droppers of a span up to each one, itself included, (n,)."""
-    order = np.lexsort((x, span))
-    of_span, at = span[order], x[order]
-    changes = (of_span[1:] != of_span[:-1]) | (at[1:] != at[:-1])
-    last = np.flatnonzero(np.append(changes, True))
-    up_to = last[np.searchsorted(last, np.arange(order.size))]
-    number = np.empty(order.size, dtype=np.int64)
-    number[order] = up_to - np.searchsorted(of_span, of_span) + 1
-    return number
 
 
 def droppers_csv(results: Results) -> str:

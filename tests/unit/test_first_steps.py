@@ -135,6 +135,21 @@ def test_spans_of_a_table_are_those_of_transitions_too(tmp_path: Path) -> None:
     assert line_data_of(scene).span_lengths == lengths
 
 
+def test_two_pantographs_and_an_overlap_find_room_in_the_spans_of_a_table(tmp_path: Path) -> None:
+    """The last pantograph starts behind two spans, and --short keeps an overlap where it judges."""
+    spans, droppers = tables(tmp_path, 31)
+    path = write_case(tmp_path / "a", "overlap", spans, droppers)
+    for shortened in (False, True):
+        scene = load_scene(path, shortened=shortened)
+        masts = line_data_of(scene).support_positions
+        behind = max(place.behind_m for place in scene.train.pantographs)
+        assert behind > 0.0
+        assert masts[2] <= scene.train.start_m - behind < masts[3]
+        assert scene.line.overlap is not None
+        first = masts[scene.line.overlap.first_span[0] - 1]
+        assert scene.train.start_m < first < scene.evaluation.to_m
+
+
 def test_a_case_of_another_file_is_named_by_it(tmp_path: Path) -> None:
     example = Path(__file__).parents[2] / "docs/examples/two_messengers.toml"
     text = write_case(tmp_path / "a", str(example)).read_text()

@@ -188,6 +188,17 @@ def test_a_number_goes_before_a_length() -> None:
     assert {*places[:2], *places[3:]} == {(5.0, 50.0)}
 
 
+def test_spans_in_which_the_wire_rises_sag_only_by_their_own_numbers() -> None:
+    """What holds for all spans, or for those of a length, holds where the wire is level."""
+    places = "positions_m=[5.0,27.5,50.0],pre_sag_mm=[0.0,30.0,0.0]"
+    every, one = f"{{span_m=55.0,{places}}}", f"{{spans=[2,30],{places}}}"
+    rising = ["line.transition.n_spans_start=2", "line.transition.n_spans_end=1"]
+    rising.append("line.transition.rise_m=0.3")
+    sags = line_data_of(load_scene("ac_simple", [*patterns(every, one), *rising])).pre_sag
+    level, own = (0.0, 0.0, 0.0), (0.0, 0.03, 0.0)
+    assert sags == (level, own, *[own] * 27, own)
+
+
 @pytest.mark.parametrize(
     ("entries", "sentence"),
     [

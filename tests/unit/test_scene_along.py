@@ -13,6 +13,7 @@ CONTACT = "line.contact_wire"
 STIFF = ["line.contact_wire.axial_stiffness_N=18e6", "line.messenger_wire.axial_stiffness_N=11e6"]
 WHOLE = [ON, *STIFF]
 TENSIONED = [*WHOLE, "line.ends.end.along=tensioner"]
+WRONG = "defects=[{type='wrong_tension',wire='contact_wire',factor=0.9}]"
 
 
 def test_wires_are_held_along_the_track_unless_the_scene_says_otherwise() -> None:
@@ -85,6 +86,10 @@ def test_a_tensioner_has_all_that_the_scene_gives() -> None:
             [*TENSIONED, "line.tensioner.weights_kg.contact_wire=700"],
             r"would hold 20601 N .* has 20000 N, which 679\.579 kg hold",
         ),
+        (
+            [*TENSIONED, "line.tensioner.weights_kg.contact_wire=679.579", WRONG],
+            r"would hold 20000 N .* has 18000 N, which 611\.621 kg hold",
+        ),
         ([*WHOLE, "line.ends.end.kind=periodic"], "ends fixed or in an absorbing_layer"),
         ([*WHOLE, "window.mode=bounded"], "waves along the track run far ahead"),
         (
@@ -97,6 +102,13 @@ def test_what_cannot_be_is_refused_in_a_sentence(assignments: list[str], sentenc
     with pytest.raises(InputError, match=sentence) as refused:
         load_scene("en50318_2002", assignments)
     assert all(line for line in str(refused.value).splitlines())
+
+
+def test_weights_are_those_of_the_tension_with_which_a_wire_hangs() -> None:
+    """A wrong one has wrong weights."""
+    weights = "line.tensioner.weights_kg.contact_wire=611.621"
+    along = problem_of(load_scene("en50318_2002", [*TENSIONED, weights, WRONG])).along
+    assert along.tensioner.weights == {"contact_wire": 611.621}
 
 
 def test_data_may_stay_where_the_effect_is_left_out() -> None:

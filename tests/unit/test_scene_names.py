@@ -27,6 +27,11 @@ def lost(wire: str, share: float = 0.9) -> str:
     return f"incidents=[{{type='tension_loss',at_s=1.0,wire='{wire}',share={share}}}]"
 
 
+def wrong(*factors: tuple[str, float]) -> str:
+    listed = (f"{{type='wrong_tension',wire='{wire}',factor={factor}}}" for wire, factor in factors)
+    return f"defects=[{','.join(listed)}]"
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_any_part_of_the_line_may_have_damping_of_its_own(case: str) -> None:
     for name in line_of(load_scene(case, [])).components:
@@ -106,6 +111,33 @@ def test_a_wire_keeps_more_tension_than_those_clamped_to_it_take() -> None:
         load_scene("re330_stitched", [lost("messenger_wire", least - 0.01)])
 
 
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ([wrong(("stitch_wire", 2.0))], r"defects.0.factor is 2 .*would then take 22000 N of its"),
+        (
+            [wrong(("stitch_wire", 1.5), ("messenger_wire", 0.6))],
+            r"defects.1.factor is 0.6 .*would then take 16500 N of its 12600 N",
+        ),
+        (
+            [wrong(("messenger_wire", 0.6)), lost("messenger_wire", 0.7)],
+            r"incidents.0.share is 0.7 .*would then take 11000 N of its 8820 N",
+        ),
+        ([wrong(("stitch_wire", 0.8), ("messenger_wire", 0.6)), lost("stitch_wire", 0.5)], None),
+    ],
+)
+def test_a_wire_keeps_more_than_clamped_ones_take_whatever_befalls_both(
+    changes: list[str], sentence: str | None
+) -> None:
+    changes = ["line.stitch_wire.tension_N=11000", *changes]
+    if sentence is None:
+        load_scene("re330_stitched", changes)
+        return
+    with pytest.raises(SceneError, match=sentence) as refused:
+        load_scene("re330_stitched", changes)
+    assert len(refused.value.faults) == 1
+
+
 def test_a_second_contact_wire_is_as_slow_as_the_first() -> None:
     """The train may be no faster than waves on any of them."""
     for wire in ("contact_wire", "contact_wire_2"):
@@ -128,3 +160,18 @@ def test_tensions_at_clamps_stay_in_balance() -> None:
         np.testing.assert_allclose(messenger.tension_at(outside), messenger.tension, rtol=1e-12)
         both = messenger.tension_at(middle) + tension
         np.testing.assert_allclose(both, messenger.tension, rtol=1e-12)
+
+
+def test_sections_side_by_side_lose_tension_each_by_itself() -> None:
+    """In an overlap stitch wires of both sections take as much over the same stretches."""
+    changes = ["line.overlap.first_span=12", "line.overlap.rise_m=0.6"]
+    line = line_of(load_scene("re330_stitched", changes))
+    for own, other in (("", "_next"), ("_next", "")):
+        name, carrier = f"stitch_wire{own}", f"messenger_wire{own}"
+        after = line.with_shares({name: 0.6})
+        stitch, messenger = after.wire(name), after.wire(carrier)
+        middle = np.array([0.5 * (piece.x[0] + piece.x[-1]) for piece in stitch.pieces])
+        both = messenger.tension_at(middle) + stitch.tension
+        np.testing.assert_allclose(both, messenger.tension, rtol=1e-12)
+        unchanged = after.wire(f"messenger_wire{other}"), line.wire(f"messenger_wire{other}")
+        np.testing.assert_array_equal(*(wire.tension_at(middle) for wire in unchanged))

@@ -96,6 +96,9 @@ REFUSED = {
     "steep overlap": (OVERLAP, ["line.overlap.rise_m=1.2"],
                       "it must be less than the 1.2 m that the messenger wire is above"),
     "overlap that rises too far": (OVERLAP, ["line.overlap.rise_m=1.1"], "below the contact wire"),
+    "overlap under a messenger wire that is near": (
+        COMPOUND, ["line.overlap.first_span=12", "line.overlap.rise_m=1.0"],
+        r"below the auxiliary wire: raise the messenger wire \(1.1 m above the auxiliary wire at "),
     "long bridle": (TRAM, [f"line.bridle={BRIDLE}", "line.bridle.length_m=30"],
                     "it must be less than the shortest span .30 m."),
     "strong bridle": (TRAM, [f"line.bridle={BRIDLE}", "line.bridle.tension_N=10000"],

@@ -60,6 +60,28 @@ def test_a_line_that_is_turned_hangs_as_its_mirror_image() -> None:
     assert not np.allclose(here["dropper_force"], there["dropper_force"], rtol=1e-2)
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "irregularities.dropper_lengths.standard_deviation_mm=4",
+        "irregularities.dropper_lengths.by_dropper=[[5, 3, 8.0]]",
+        'defects=[{type = "missing_dropper", span = 5, dropper = 4}]',
+    ],
+)
+def test_what_is_wrong_with_one_of_two_wires_stays_with_it(wrong: str) -> None:
+    """Lateral positions stay, so that each of twin wires is its own mirror image."""
+    words = ["line.n_spans=14", "mesh.elements_per_gap=2", "effects.relative_motion=true", wrong]
+    scene = load_scene("dc_twin", [*words, "evaluation.from_m=385", "evaluation.to_m=440"])
+    here, there = static_table(scene), static_table(turned(scene))
+    one, other = np.split(here["contact_height"], 2)
+    for own, name in ((one, "contact_wire"), (other, "contact_wire_2")):
+        assert own.size == here[f"wires/{name}"].size
+    mirrored = np.concatenate([half[::-1] for half in np.split(there["contact_height"], 2)])
+    # Of two solves of one equilibrium, whose matrices have a condition of 1e7.
+    assert mirrored == pytest.approx(here["contact_height"], rel=0.0, abs=1e-8)
+    assert np.abs(one - other).max() > 1e-3  # so that an exchange of the wires shows
+
+
 def test_turning_twice_gives_the_scene_that_was() -> None:
     scene = scene_of(*ONE_SIDED)
     once, twice = turned(scene), turned(turned(scene))

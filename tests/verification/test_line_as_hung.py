@@ -116,6 +116,7 @@ def test_lengths_as_cut_rest_as_absolute_heights_do(error: float) -> None:
     check("heights [m]", heights_of(model, form), expected, within=1e-9)
     slack = form.dropper_force == 0.0
     assert slack.any() == (abs(error) > 0.05)
+    assert not np.signbit(form.dropper_force).any()  # tables would show -0.000 N
     assert np.array_equal(slack, model.dropper_gap > 0.0)
     upper, lower = model.mesh.droppers.T
     stretch = form.height[upper] - form.height[lower] - form.dropper_length
@@ -230,6 +231,28 @@ def test_a_hard_spot_hangs_on_the_wire_and_stands_still_on_its_spring() -> None:
     lift = sprung.dofs(np.arange(sprung.mesh.n_nodes))
     # A wire lifted as a whole is lifted there: the sum over its heights is that of the spring.
     check("spring beside a mass [N/m]", added[np.ix_(lift, lift)].sum(), 500.0, within=1e-7)
+
+
+@pytest.mark.parametrize(
+    "other", [None, WrongTension(MESSENGER_WIRE, 0.9), MissingDropper(DropperPlace(MIDDLE))]
+)
+def test_a_spring_carries_nothing_at_rest_whatever_else_moves_the_line(
+    other: WrongTension | MissingDropper | None,
+) -> None:
+    """The mass sinks, and the line goes where its other defect lets it, as without the spring."""
+    more = () if other is None else (other,)
+    spots = (HardSpot(CONTACT_WIRE, 120.3, 5.0, stiffness) for stiffness in (0.0, 5000.0))
+    (_, _, bare, alone), (_, _, sprung, form) = (hung(spot, *more) for spot in spots)
+    first = sound()[1]
+    assert np.abs(form.height - first.height).max() > 5e-3
+    check("heights [m]", form.height, alone.height, within=1e-12)
+    check("droppers [N]", form.dropper_force, alone.dropper_force, within=1e-9)
+    assert np.array_equal(sprung.dropper_gap, bare.dropper_gap)
+    # In motion it resists: a lift of all wires by one, whose elements turn by nothing.
+    added = matrix_of(sprung, stiffness=1.0) - matrix_of(bare, stiffness=1.0)
+    lift = np.zeros(sprung.n_dofs)
+    lift[sprung.dofs(np.arange(sprung.mesh.n_nodes))] = 1.0
+    check("spring [N/m]", lift @ (added @ lift), 5000.0, within=1e-6)
 
 
 def test_irregular_heights_are_met_where_droppers_can_pull() -> None:

@@ -29,6 +29,7 @@ CASES = {
     "stitched": "re330_stitched",
     "compound": "shinkansen_compound",
     "twin": "dc_twin",
+    "ambrosio2012": "ambrosio2012",  # with transition spans, whose droppers have lengths too
 }
 
 

@@ -114,7 +114,8 @@ def _patterns(
 def _lengths(scene: Scene, rows: Sequence[tuple[int, dict[str, float]]]) -> np.ndarray:
     """Lengths to which droppers of the contact wire are cut, (n_rows,) in the order of a table [m].
 
-    Of twin wires that hang in pairs both droppers of a place have one length.
+    Of twin wires that hang in pairs both droppers of a place have one length. Of two sections side
+    by side these are the droppers of the wire that is named first.
     """
     problem, mesh = problem_of(scene), mesh_of(scene)
     line, lengths = problem.line, lengths_to_cut(problem, mesh)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from catenary.cases.scene.checks.pantographs import reaches_below
 from catenary.cases.scene.input.faults import Fault
@@ -67,6 +67,7 @@ def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
                 why = f"{wire.name} has no bending stiffness, and so keeps no bend under tension"
                 yield scene.refused(f"{key}.angle_deg", why)
     yield from _broken_later(scene, seen)
+    yield from _left_nothing(scene, line, line, _wrong_tensions(scene))
 
 
 def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
@@ -183,6 +184,42 @@ def taken_faults(scene: Scene, wire: Wire, key: str, share: float) -> Iterator[F
         yield scene.refused(key, why)
 
 
+# A wire whose tension is another one: the key, the wire, and the share of its tension.
+_Change = tuple[str, str, float]
+
+
+def _wrong_tensions(scene: Scene) -> list[_Change]:
+    if not scene.switches()["wrong_tension"]:
+        return []
+    return [
+        (f"defects.{i}.factor", table.wire, table.factor)
+        for i, table in enumerate(scene.defects)
+        if isinstance(table, WrongTensionTable)
+    ]
+
+
+def _left_nothing(
+    scene: Scene, sound: Line, line: Line, changes: Iterable[_Change]
+) -> Iterator[Fault]:
+    """The first of some changes with which clamped wires take all that a wire has.
+
+    What the ``sound`` line does not allow by itself is said elsewhere.
+    """
+    shares: dict[str, float] = {}
+    for key, name, share in changes:
+        if share * sound.wire(name).tension <= sound.wire(name).most_taken:
+            return
+        shares[name] = share
+        for wire in line.with_shares(shares).wires:
+            if wire.taken and wire.tension <= wire.most_taken:
+                why = (
+                    f"wires that are clamped to {wire.name} would then take {wire.most_taken:g} N "
+                    f"of its {wire.tension:g} N"
+                )
+                yield scene.refused(key, why)
+                return
+
+
 def _wrong_tension(
     scene: Scene, line: Line, wire: Wire, key: str, factor: float
 ) -> Iterator[Fault]:
@@ -227,6 +264,15 @@ def check_incidents(scene: Scene, line: LineData) -> Iterator[Fault]:
             assert isinstance(table, LoweringTable)
             yield from _lowering(scene, i, table, line)
     yield from _tensions_fall(scene)
+    losses = sorted(
+        (table.at_s, f"incidents.{i}.share", table.wire, table.share)
+        for i, table in enumerate(scene.incidents)
+        if isinstance(table, TensionLossTable)
+    )
+    if losses:
+        sound, changes = make_line(line), [loss[1:] for loss in losses]
+        wrong = {name: factor for _, name, factor in _wrong_tensions(scene)}
+        yield from _left_nothing(scene, sound, sound.with_shares(wrong), changes)
 
 
 def _what(scene: Scene, table: IncidentTable) -> tuple[str, tuple[object, ...]]:

@@ -277,8 +277,8 @@ def droppers_inside(
             "or count and spacing_m",
         )
         return
-    for number, (positions, _) in hung_in(scene.origin, table, kind, spans).items():
-        span = spans[number]
+    for number, own in hung_in(scene.origin, table, kind, spans).items():
+        span, positions = spans[number], own.positions
         outside = [x for x in positions if not SHORTEST_GAP <= x <= span - SHORTEST_GAP]
         close = [pair for pair in zip(positions, positions[1:], strict=False)
                  if pair[1] - pair[0] < SHORTEST_GAP]  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.table import take_away
 from catenary.cases.scene.line.free import FreeWireTable
+from catenary.cases.scene.line.imperfections import WrongTensionTable
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import TENSIONER, along_of, arm_tables, wire_tables
 from catenary.cases.scene.run.incidents import DropperBreakTable, TensionLossTable
@@ -196,7 +197,12 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
     tensioner = along.tensioner
     if not tensioner.weights:
         return
-    wires = {wire.name: wire for wire in make_line(line).wires}
+    wrong = {
+        defect.wire: defect.factor
+        for defect in scene.defects
+        if isinstance(defect, WrongTensionTable) and scene.switches()["wrong_tension"]
+    }
+    wires = {wire.name: wire for wire in make_line(line).with_shares(wrong).wires}
     tensioned = [name for name, wire in wires.items() if _has_tensioner(wire, along, line)]
     for name in tensioner.weights:
         key = f"line.tensioner.weights_kg.{name}"

@@ -209,10 +209,18 @@ def dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:
 
 
 class Hung(NamedTuple):
-    """Droppers of a span: distances from its left support [m] and the pre-sag of each [m]."""
+    """Droppers of a span: distances from its left support [m] and the pre-sag of each [m].
+
+    ``of_span`` is whether the pre-sag is that of this very span, by its number.
+    """
 
     positions: tuple[float, ...]
     pre_sag: tuple[float, ...]
+    of_span: bool = False
+
+    def sagging(self, running: bool) -> tuple[float, ...]:
+        """The pre-sag of each dropper [m]: spans that are not ``running`` have only their own."""
+        return self.pre_sag if running or self.of_span else (0.0,) * len(self.positions)
 
 
 def hung_in(
@@ -234,7 +242,8 @@ def hung_in(
         pattern = by_number.get(number)
         if pattern is not None:
             places = tuple(pattern.positions_m)
-            found[number] = Hung(places, _pre_sag(kind, pattern, places))
+            own_sag = pattern.pre_sag_mm is not None
+            found[number] = Hung(places, _pre_sag(kind, pattern, places), own_sag)
             continue
         if span not in by_length:
             of_length = {p.span_m: p for p in kind.patterns or () if p.span_m is not None}

@@ -33,7 +33,13 @@ class TensionerTable(Table):
         le=20,
         description="how far the end of a wire may move either way until a stop holds it",
     )
-    stop_stiffness_N_per_m: float = Field(1e6, gt=0, le=1e9, description="stiffness of that stop")
+    stop_stiffness_N_per_m: float = Field(
+        1e6,
+        gt=0,
+        le=1e9,
+        description="stiffness of a stop that an end reaches in a run; one that holds it at rest "
+        "does not give",
+    )
     weights_kg: dict[str, Mass] = Field(
         default_factory=dict,
         description="mass of the weights by name of the wire; those of others fit their tensions",

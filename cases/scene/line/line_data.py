@@ -57,10 +57,7 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
     if hung is not None:
         droppers = list(hung_in(origin, "line.dropper", hung, numbered(spans)).values())
     first, last = table.transition.n_spans_start, table.n_spans - table.transition.n_spans_end
-    pre_sag = [
-        own.pre_sag if first <= i < last else (0.0,) * len(own.positions)
-        for i, own in enumerate(droppers)
-    ]
+    pre_sag = [own.sagging(first <= i < last) for i, own in enumerate(droppers)]
     return LineData(
         span_lengths=spans,
         dropper_positions=tuple(own.positions for own in droppers),
@@ -310,8 +307,7 @@ def _droppers(
     own = {span: spans[span - 1] for span in table.spans or range(1, line.n_spans + 1)}
     for span, hung in hung_in(origin, key, table, own).items():
         places += [float(starts[span - 1] + x) for x in hung.positions]
-        running = first <= span - 1 < last
-        sags += hung.pre_sag if running else (0.0,) * len(hung.positions)
+        sags += hung.sagging(first <= span - 1 < last)
     at = tuple(places)
     return FreeDroppers(table.name, kind, table.upper, table.lower, at, at, tuple(sags))
 

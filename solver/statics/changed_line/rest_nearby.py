@@ -231,7 +231,8 @@ class RestNearby:
         return Rest(replace(held, dropper_force=carried), moved, reserve, gap)
 
     def _carried(self, reserve: np.ndarray, slack: np.ndarray) -> np.ndarray:
-        return np.where(slack, (1.0 - self._lost) * reserve, reserve)
+        # Nothing is left of most slack droppers: no negative zero for tables.
+        return np.where(slack, (1.0 - self._lost) * reserve, reserve) + 0.0
 
     def _newton(
         self, moved: np.ndarray, slack: np.ndarray

@@ -12,7 +12,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.model.link_directions import dropper_directions
 from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.problem.defects import Defect, HardSpot
+from catenary.solver.problem.defects import HardSpot
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.changed_line.potential import Potential
 from catenary.solver.statics.changed_line.rest_nearby import RestNearby, StiffLine, where
@@ -50,10 +50,8 @@ def hang(
             "take smaller errors"
         )
     wanted = cut.dropper_lengths
-    # Springs of hard spots carry nothing where the line comes to rest, so they do not decide where.
-    loose = replace(problem, defects=tuple(map(_without_spring, problem.defects)))
-    sprung = any(isinstance(defect, HardSpot) and defect.stiffness for defect in problem.defects)
-    model = build(loose, mesh, length, form=form, cut_lengths=wanted)
+    springless = _without_springs(problem)
+    model = build(springless, mesh, length, form=form, cut_lengths=wanted)
     potential = Potential(cut, model, form, form.dropper_length + errors)
     if stiff is not None and not same_matrices(stiff.model, model):
         stiff = None
@@ -66,8 +64,8 @@ def hang(
         )
     _refuse_slack_wires(model, rest.form)
     moved_stops = rest.form.arm_raised.any()
-    bends = effects.needs_form(problem) or model.droppers_bend
-    if not (bends or rest.gap.any() or moved_stops or sprung):
+    depends = effects.needs_form(problem) or model.droppers_bend or springless is not problem
+    if not (depends or rest.gap.any() or moved_stops):
         model.form = rest.form
         assert model.droppers is not None
         if all(map(np.array_equal, dropper_directions(model), model.droppers.direction)):
@@ -76,8 +74,13 @@ def hang(
     return hung, rest.form
 
 
-def _without_spring(defect: Defect) -> Defect:
-    return replace(defect, stiffness=0.0) if isinstance(defect, HardSpot) else defect
+def _without_springs(problem: Problem) -> Problem:
+    """The problem without the springs of hard spots, which carry nothing at rest."""
+    defects = tuple(
+        replace(defect, stiffness=0.0) if isinstance(defect, HardSpot) else defect
+        for defect in problem.defects
+    )
+    return problem if defects == tuple(problem.defects) else replace(problem, defects=defects)
 
 
 def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:

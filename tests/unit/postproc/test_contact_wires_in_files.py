@@ -112,8 +112,10 @@ def test_the_report_shows_each_wire(tmp_path: Path, usual: dict[str, Any]) -> No
 def test_arms_and_droppers_of_several_wires_are_named(
     tmp_path: Path, usual: dict[str, Any]
 ) -> None:
-    """Twins have two of each at a place, of which each tells its wire, and numbers of its own."""
-    path = recorded(twins(0.3), tmp_path, usual)
+    """Twins have two of each at a place, of which each tells its wire, and the number that a scene
+    gives it."""
+    line = twins(0.3)
+    path = recorded(line, tmp_path, usual)
     write_report(path, tmp_path)
     supports = json.loads((tmp_path / "summary.json").read_text())["supports"]["per_support"]
     at_one = [row["wire"] for row in supports if row["x_m"] == supports[0]["x_m"]]
@@ -121,9 +123,11 @@ def test_arms_and_droppers_of_several_wires_are_named(
     with Results(path) as results:
         rows = csv_tables.dropper_table(results)
         droppers, x = results.line("droppers"), results.line("dropper_x")
-        for name in (FIRST, SECOND):
-            own = [row for row in rows if row.lower == name and row.span == 1]
-            assert [row.number for row in own] == list(range(1, len(own) + 1))
+        for nth, name in enumerate((FIRST, SECOND)):
+            own = [row for row in rows if row.lower == name and row.span == 2]
+            assert [row.number for row in own] == [2 * i + 1 + nth for i in range(len(own))]
+            places = [line.dropper_of_span(2, row.number) for row in own]
+            assert places == [(pytest.approx(row.x), nth) for row in own]
             nodes = results.wires()[name]
             expected = np.sort(x[np.isin(droppers[:, 1], nodes)])
             np.testing.assert_allclose([row.x for row in rows if row.lower == name], expected)
