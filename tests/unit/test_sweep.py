@@ -333,6 +333,8 @@ def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
         "leading, law hard": [(200.0, 200.0), (300.0, 300.0)],
         "leading, law soft": [(200.0, 200.0), (300.0, 300.0)],
     }
+    looks = [(line.get_marker(), line.get_linestyle()) for line in figure.axes[0].get_lines()]
+    assert looks == [("o", "-"), ("s", "--")]  # a print without colours tells them apart
     assert figure.axes[1].get_xlabel() == "train speed [km/h]"
     assert figure.axes[0].get_ylabel() == "standard deviation,\n0-20 Hz [N]"
     assert figure.axes[1].get_ylabel() == "largest uplift at\narms [mm]"

@@ -409,8 +409,7 @@ def draw(study: SeparationStudy, period: Period) -> Figure | None:
         for number, name in enumerate(names):
             y = np.array([row[name] for row in done], dtype=float)
             of = PLACES[number] if len(names) > 1 else "both"
-            # The second one is dashed, for print in black.
-            look = ".--" if number else ".-"
+            look = f".{figures.line(number)}"
             figures.curve(axes, x, y, number if len(names) > 1 else 2, of, look)
         if (alone := study.rows[0][names[0]]) is not None:
             axes.axhline(alone, color=figures.GREY, linestyle=":", label="one alone")
