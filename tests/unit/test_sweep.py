@@ -294,6 +294,15 @@ def test_rows_have_one_line_per_pantograph_and_one_per_broken_variant() -> None:
     assert "BROKE: it broke" in as_text(ended)
 
 
+def test_names_of_criteria_that_failed_are_told_apart() -> None:
+    """Their names have commas."""
+    one = fake("a", {"k": "1"}, 10.0)
+    names = ["standard deviation, 0.3 of the mean", "arcing NQ"]
+    one.summary["acceptance"] = [{"criterion": name, "passed": False} for name in names]
+    one.summary["passed"] = False
+    assert f"FAILED {'; '.join(names)}" in as_text([one])
+
+
 def test_each_row_names_its_variant_where_keys_are_varied_beside_named_ones(
     tmp_path: Path,
 ) -> None:

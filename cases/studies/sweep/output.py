@@ -60,7 +60,7 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         rules = [*one.summary.get("acceptance", []), *unjudged]
         head["rules"] = list(dict.fromkeys(row["book"] for row in rules if row.get("book")))
         verdict = "passed" if head["passed"] else "not judged"
-        head["accepted"] = f"FAILED {', '.join(failed)}" if failed else verdict
+        head["accepted"] = f"FAILED {'; '.join(failed)}" if failed else verdict
         head["wall_s"] = one.wall
         rows += [head | figures for figures in statistics_of(one.summary)]
     columns = [
