@@ -22,6 +22,7 @@ from catenary.base.lone_process import world as world
 from catenary.base.options import command_line
 from catenary.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 from catenary.cases.scene.input.plain_text import plain, shown
+from catenary.postproc.evaluate.terminal_width import folded, terminal_width
 from catenary.postproc.files.disk_errors import reason
 
 DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
@@ -71,13 +72,14 @@ def is_quiet() -> bool:
     return _quiet
 
 
-def say(text: str) -> None:
+def say(text: str, *, whole: bool = False) -> None:
     """Print to standard output on rank 0, unless the verb is to be quiet. Not collective.
 
     Titles and names out of files of strangers do not steer the terminal: what would is escaped.
+    Sentences are folded at the width of a terminal, but not of text that is to stay ``whole``.
     """
     if speaks() and not _quiet:
-        print_as_is(shown(text) + "\n")
+        print_as_is(folded(shown(text), None if whole else terminal_width()) + "\n")
 
 
 def print_as_is(text: str) -> None:
@@ -108,8 +110,9 @@ def warn(sentence: str) -> None:
 
 def _print_error(head: str, sentence: str) -> None:
     """Print a sentence to standard error; where that cannot be written to nobody hears it."""
+    line = head + plain(" ".join(sentence.split()))
     try:
-        typer.echo(head + plain(" ".join(sentence.split())), err=True)
+        typer.echo(folded(line, terminal_width(sys.stderr)), err=True)
     except OSError:
         _discard(sys.stderr)
 

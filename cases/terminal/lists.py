@@ -21,6 +21,7 @@ from catenary.cases.scene.keys.table import OneOrMore
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
 from catenary.cases.scene.scene import Scene
+from catenary.postproc.evaluate.terminal_width import terminal_width
 from catenary.postproc.standards.book import Rule, RuleBook
 from catenary.postproc.standards.library import DEFAULT, book_named, editions_of, shipped
 from catenary.postproc.standards.quantities import QUANTITIES, SYSTEMS
@@ -160,7 +161,7 @@ def _details(key: Key) -> str:
         lines.append(f"usual: {low:.12g} to {high:.12g}")
     lines += _about_effect(key.name)
     wrapped = [
-        textwrap.fill(line, 96, initial_indent="    ", subsequent_indent="      ")
+        textwrap.fill(line, _width(), initial_indent="    ", subsequent_indent="      ")
         for line in lines
         if line
     ]
@@ -300,7 +301,12 @@ def comparison(book: RuleBook, rule: Rule) -> str:
 
 
 def _folded(text: str) -> list[str]:
-    return textwrap.wrap(text, _WIDTH, initial_indent="    ", subsequent_indent="      ")
+    return textwrap.wrap(text, _width(), initial_indent="    ", subsequent_indent="      ")
+
+
+def _width() -> int:
+    """Columns of folded text, those of a narrower terminal."""
+    return min(_WIDTH, terminal_width() or _WIDTH)
 
 
 def scene_schema() -> dict[str, Any]:

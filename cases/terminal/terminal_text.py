@@ -48,7 +48,7 @@ def summary_text(
         f"{end:g} m",
         "",
         f"  {'pantograph':12}{'mean':>8}{'std':>8}{'max':>8}{'min':>8}{'stat max':>10}"
-        f"{'stat min':>10}  [N]{'loss':>8} [%]",
+        f"{'stat min':>10}  [N]{'loss':>5} [%]",
     ]
     for i, one in enumerate(summary["pantographs"]):
         figures = [one[f"{name}_N"] for name in ("mean", "std", "max", "min")]
@@ -57,7 +57,7 @@ def summary_text(
             f"  {one.get('name') or i + 1!s:12}"
             + "".join(f"{_number(value):>8}" for value in figures)
             + "".join(f"{_number(value):>10}" for value in limits)
-            + f"{_number(one['loss_percent'], 3):>13}"
+            + f"{_number(one['loss_percent'], 3):>10}"
         )
     droppers = summary["droppers"]
     lines += [
