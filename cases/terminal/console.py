@@ -10,7 +10,8 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, TextIO, get_type_hints
 
@@ -122,6 +123,19 @@ def _discard(stream: TextIO) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """While entered, a terminal shows what is made, in a line that goes. Not collective."""
+    is_shown = speaks() and not _quiet and sys.stderr.isatty()
+    try:
+        if is_shown:
+            print(f"\r{what} ...\x1b[K", end="", file=sys.stderr, flush=True)
+        yield
+    finally:
+        if is_shown:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
 def open_closed_streams() -> None:
