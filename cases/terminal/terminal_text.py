@@ -170,7 +170,7 @@ def elasticity_text(x: np.ndarray, elasticity: np.ndarray) -> str:
     lift = 1e3 * elasticity
     return (
         f"Elasticity from {x.min():g} to {x.max():g} m: {lift.min():.3f} to "
-        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
+        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, non-uniformity "
         f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %"
     )
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 _TEMPLATES = Path(__file__).parent / "templates"
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:N|mm|m|km/h|Hz|s)\b)")
+# A figure with its unit, which stay on one line.
+_FIGURE = re.compile(r"(?<=\d) (%|(?:N|kN|mm|m|km|kg|Hz|s|J)(?:/[A-Za-z]{1,2})?)(?![\w/])")
 # Cells of tables that are coloured.
 _MARKS = {
     "passed": "yes", "failed": "no", "yes": "yes", "no": "no", "?": "unknown",
@@ -77,19 +78,24 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["minus"] = lambda value: with_minus(str(value))
+    environment.filters["figures"] = lambda value: _whole(with_minus(str(value)))
     environment.filters["commands"] = _with_commands
     environment.filters["unit_whole"] = _with_whole_unit
     return environment.get_template("page.html.j2")
+
+
+def _whole(text: str) -> str:
+    """Text in which no line ends between a figure and its unit, or within the unit."""
+    joined = "/\N{WORD JOINER}"
+    return _FIGURE.sub(lambda found: f"\N{NO-BREAK SPACE}{found[1].replace('/', joined)}", text)
 
 
 def _with_commands(text: str) -> Any:
     """A sentence as HTML, in which what stands between back quotes is a command."""
     from markupsafe import Markup, escape
 
-    # A figure stays on the line of its unit.
-    words = _BEFORE_UNIT.sub("\u00a0", str(escape(with_minus(text)))).split("`")
-    return Markup("".join(f"<code>{w}</code>" if n % 2 else w for n, w in enumerate(words)))
+    words = str(escape(with_minus(text))).split("`")
+    return Markup("".join(f"<code>{w}</code>" if n % 2 else _whole(w) for n, w in enumerate(words)))
 
 
 def _with_whole_unit(head: str) -> Any:
