@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _TEMPLATES = Path(__file__).parent / "templates"
 # A figure with its unit, which stay on one line.
 _FIGURE = re.compile(r"(?<=\d) (%|(?:N|kN|mm|m|km|kg|Hz|s|J)(?:/[A-Za-z]{1,2})?)(?![\w/])")
+# A unit behind its figure, or in brackets.
+_UNIT = re.compile(r"(?<=\xa0)\w+/\w+|\[\w+/\w+\]")
 # Cells of tables that are coloured.
 _MARKS = {
     "passed": "yes", "failed": "no", "yes": "yes", "no": "no", "?": "unknown",
@@ -78,7 +80,6 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["figures"] = lambda value: _whole(with_minus(str(value)))
     environment.filters["commands"] = _with_commands
     environment.filters["unit_whole"] = _with_whole_unit
     return environment.get_template("page.html.j2")
@@ -86,15 +87,15 @@ def _template() -> Template:
 
 def _whole(text: str) -> str:
     """Text in which no line ends between a figure and its unit, or within the unit."""
-    joined = "/\N{WORD JOINER}"
-    return _FIGURE.sub(lambda found: f"\N{NO-BREAK SPACE}{found[1].replace('/', joined)}", text)
+    text = _FIGURE.sub("\N{NO-BREAK SPACE}\\1", text)
+    return _UNIT.sub(lambda found: found[0].replace("/", "/\N{WORD JOINER}"), text)
 
 
-def _with_commands(text: str) -> Any:
+def _with_commands(text: Any) -> Any:
     """A sentence as HTML, in which what stands between back quotes is a command."""
     from markupsafe import Markup, escape
 
-    words = str(escape(with_minus(text))).split("`")
+    words = str(escape(with_minus(str(text)))).split("`")
     return Markup("".join(f"<code>{w}</code>" if n % 2 else _whole(w) for n, w in enumerate(words)))
 
 

@@ -168,10 +168,13 @@ def test_a_wide_table_ends_within_the_margins_of_its_sheet() -> None:
 
 def test_no_line_ends_within_a_unit() -> None:
     """Of a cell or a sentence; what is to be copied stays as it is."""
-    table = texts_table(["data"], [["vertical stiffness 182 N/m, 45 % of it, 3 of 4"]])
+    cells = [["vertical stiffness 182 N/m, 45 % of it, 3 of 4"], ["run `catenary judge` 9 % or so"]]
+    table = texts_table(["data"], cells)
     text = Text("Elasticity 0.42 mm/N; `catenary worst --at 100 m`.")
-    html = page("title", "", [Section("Wires", [text, table])], {})
+    html = page("title", "By 7.8 % [mm/N].", [Section("Wires", [text, table])], {})
+    assert "By 7.8\u00a0% [mm/\u2060N]." in html
     assert "stiffness 182\u00a0N/\u2060m, 45\u00a0% of it, 3 of 4" in html
+    assert "run <code>catenary judge</code> 9\u00a0% or so" in html
     assert "Elasticity 0.42\u00a0mm/\u2060N; <code>catenary worst --at 100 m</code>." in html
 
 
