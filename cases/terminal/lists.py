@@ -106,11 +106,17 @@ def _default(field: FieldInfo) -> str:
 
 
 def key_table() -> str:
-    """Every key of a scene: name, unit, default, meaning; one line each."""
-    rows = []
+    """Every key of a scene: name, unit, default, meaning; one line each, and on a terminal the
+    meaning below, which is wider than that."""
+    rows, is_shown = [], terminal_width() is not None
     for key in keys_of_a_scene():
         some = f" ({', '.join(key.kinds)})" if key.kinds else ""
-        rows.append(f"{key.name:52} {key.unit:8} {key.default:12} {key.meaning}{some}")
+        about = f"{key.name:52} {key.unit:8} {key.default:12}"
+        rows += (
+            [about.rstrip(), *_folded(f"{key.meaning}{some}")]
+            if is_shown
+            else [f"{about} {key.meaning}{some}"]
+        )
     return "\n".join(rows)
 
 
@@ -261,7 +267,8 @@ def book_table() -> str:
     default, rows = book_named(DEFAULT).key, []
     for key, book in shipped().items():
         note = " (where a scene names none)" if key == default else ""
-        rows.append(f"{key:18} {len(book.criteria):2} criteria  {book.title}{note}")
+        noun = "criterion" if len(book.criteria) == 1 else "criteria"
+        rows.append(f"{key:18} {len(book.criteria):2} {noun:9} {book.title}{note}")
     return "\n".join(rows)
 
 

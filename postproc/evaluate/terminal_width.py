@@ -12,9 +12,6 @@ from typing import TextIO
 _FEWEST = 40
 # Blanks that stay within a line: before a unit, and before a mark at the end.
 _KEPT = re.compile(r"(?<=\d) (?=(?:%|°|\w{1,2}(?:/\w+)?)(?!\w))| (?=\*$)")
-# What stands in a row of its own before a sentence, as ``REMARK``: its continuation stands below
-# the sentence. Longer ones leave too little room.
-_MOST_BEFORE = 24
 
 
 def terminal_width(stream: TextIO | None = None) -> int | None:
@@ -52,9 +49,10 @@ def _folded(line: str, width: int) -> str:
         return line
     indent = len(line) - len(line.lstrip())
     gaps = [gap.end() for gap in re.finditer(r"\S {2,}(?=\S)", line)]
-    if len(gaps) > 1 or (gaps and gaps[0] > _MOST_BEFORE):
+    # A word or two before a sentence, as ``REMARK``, leave it room beside; more are a row.
+    if len(gaps) > 2 or (gaps and gaps[-1] > width // 2):
         return line
-    below = " " * (gaps[0] if gaps else indent + 2)
+    below = " " * (gaps[-1] if gaps else indent + 2)
     kept = textwrap.fill(
         _KEPT.sub("\N{NO-BREAK SPACE}", line),
         width,

@@ -171,10 +171,9 @@ def followed(data: FilmData, camera: str | None) -> list[int]:
         return [data.names.index(camera)]
     if camera.isdigit() and 1 <= int(camera) <= data.n_pantographs:
         return [int(camera) - 1]
-    raise InputError(
-        f"--camera is {camera!r}; this run has {', '.join(map(repr, data.names))}, "
-        f"or a number from 1 to {data.n_pantographs}"
-    )
+    names, n = ", ".join(map(repr, data.names)), data.n_pantographs
+    numbers = f", or a number from 1 to {n}" if n > 1 else " or 1"
+    raise InputError(f"--camera is {camera!r}; it must be {names}{numbers}")
 
 
 class Pictures:
