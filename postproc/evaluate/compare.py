@@ -201,7 +201,7 @@ def _by_spans(runs: Sequence[Results]) -> list[str]:
             found = differences(first, other, paired)
             for label, one in zip(STATISTICS, found or (), strict=False):
                 mark = "more than chance" if one.is_certain else "within chance"
-                figures = f"{one.value:8.3f}{one.low:8.3f} to{one.high:7.3f}  {mark}"
+                figures = f"{one.value:8.3f}{one.low:8.3f} to{one.high:7.3f} {mark}"
                 rows.append((f"{name} {label}", f" {letter} - A{figures}"))
     if not rows:
         return []
