@@ -306,6 +306,8 @@ def json_text(record: Mapping[str, Any]) -> str:
 def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     """Lines for below a table, each remark once with the runs that it is of; none without remarks.
 
+    Of many remarks that differ in numbers alone, the first stands for all.
+
     Parameters
     ----------
     runs : iterable of tuple
@@ -316,7 +318,24 @@ def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     for name, remarks in named:
         for text in dict.fromkeys(remarks):
             names.setdefault(text, []).append(name)
-    return [f"REMARK      {_of(own, len(named))}: {text}" for text, own in names.items()]
+    lines = []
+    for texts in alike(names):
+        if len(texts) > _NAMED:
+            runs_of = dict.fromkeys(name for text in texts for name in names[text])
+            first = names[texts[0]][0]
+            whose = f"{len(runs_of)} of {len(named)} runs, here the numbers of {first}"
+            lines.append(f"REMARK      {whose}: {texts[0]}")
+        else:
+            lines += [f"REMARK      {_of(names[text], len(named))}: {text}" for text in texts]
+    return lines
+
+
+def alike(remarks: Iterable[str]) -> list[list[str]]:
+    """Remarks that differ in their numbers alone, together, in the order of the first of each."""
+    groups: dict[str, list[str]] = {}
+    for text in remarks:
+        groups.setdefault(re.sub(r"\d[\d.]*(?:e[-+]?\d+)?", "0", text), []).append(text)
+    return list(groups.values())
 
 
 def _of(names: Sequence[str], n_runs: int) -> str:

@@ -390,7 +390,7 @@ def test_what_failed_is_told_by_name(tmp_path: Path) -> None:
     [
         ("line.contact_wire.tension_N", "contact wire: tension [N]"),
         ("contact.stiffness_N_per_m", "contact: stiffness [N/m]"),
-        ("pantographs.lumped.static_force_N", "lumped: force on the wire at rest [N]"),
+        ("pantographs.lumped.static_force_N", "lumped: static contact force [N]"),
         ("mesh.elements_per_gap", "mesh: elements per gap"),
         ("named", "named"),
     ],

@@ -28,7 +28,7 @@ from catenary.cases.studies.uncertainty.run_table import RunTable, run_table, sa
 from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
 from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
+from catenary.postproc.report.study_table import Column, Content, StudyTable, alike, write_files
 
 # Panels, points and lines that a picture has room for.
 _MOST_KEYS, _MOST_STATISTICS, _MOST_POINTS, _MOST_LINES = 6, 5, 5000, 1000
@@ -289,8 +289,12 @@ def as_text(found: Uncertainty) -> str:
     shown = [r for r in found.sensitivity if "with" not in r and r["statistic"] not in hidden]
     if shown:
         parts.append(capital(found.method) + "\n" + _indices(shown).text())
-    remarks = found.remarks[:_MOST_REMARKS]
-    lines = [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in remarks]
+    n_of = {one["remark"]: one["n"] for one in found.remarks}
+    lines = []
+    for texts in alike(n_of)[:_MOST_REMARKS]:
+        numbers = ", with different numbers, such as" if len(texts) > 1 else ""
+        n = sum(n_of[text] for text in texts)
+        lines.append(f"REMARK      {n} of {found.n_runs} runs{numbers}: {texts[0]}")
     lines += [f"NOTE        {note}" for note in found.notes]
     return "\n\n".join([*parts, *(["\n".join(lines)] if lines else [])])
 
