@@ -275,17 +275,22 @@ def _registration_text(data: Mapping[str, np.ndarray], wires: Sequence[str]) -> 
     if table is None:
         return []
     head = ("arm at [m]", "stagger [m]", "radial [N]", "lift [N]", "slope [deg]", "along [N]")
-    heads = "".join(f"{name:>12}" for name in (*head, "slew [deg]"))
-    lines = ["", heads + ("  wire" if table.wires else "")]
+    heads = (*head, "slew [deg]")
+    widths = [max(len(name) + 1, 10) for name in heads]
+
+    def row(cells: Sequence[str]) -> str:
+        return "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+
+    lines = ["", row(heads) + ("  wire" if table.wires else "")]
     shown: dict[tuple[str, ...], str] = {}
     for place, *figures in table.rows():
         wire = f"  {figures[-1]}" if table.wires else ""
         if tuple(figures) in shown:
-            lines.append(f"{place:>12} as {shown[tuple(figures)]}{wire}")
+            lines.append(f"{place:>{widths[0]}} as {shown[tuple(figures)]}{wire}")
             continue
         shown[tuple(figures)] = place
         columns = figures[:-1] if table.wires else figures
-        lines.append("".join(f"{figure:>12}" for figure in (place, *columns)) + wire)
+        lines.append(row((place, *columns)) + wire)
     return [*lines, *(f"  {text}" for text in table.warnings()), ""]
 
 
