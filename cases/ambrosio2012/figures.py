@@ -98,7 +98,7 @@ def _forces(folders: Folders) -> StudyFigure:
 def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Columns) -> None:
     with Results(folder) as results:
         for number, (place, position, force) in enumerate(_filtered(results)):
-            figures.curve(axes, position, force, number, place, width=0.8)
+            figures.curve(axes, position, force, number, place, figures.line(number), 0.8)
             name = f"{damping} {_label(train, place)}"
             columns[f"{name} position [m]"] = position
             columns[f"{name} force [N]"] = force
@@ -230,7 +230,8 @@ def _by_separation(number: int, damping: str, rows: Rows) -> StudyFigure:
         shown = {row["train"]: row for row in own if row["place"] in (place, SINGLE)}
         for index, (name, value) in enumerate(_STATISTICS):
             values = [value(force) for force in shown.values()]
-            figures.curve(axes, range(len(shown)), values, index, name, "o-")
+            look = figures.mark(index) + figures.line(index)
+            figures.curve(axes, range(len(shown)), values, index, name, look)
             columns[f"{name} [N]"] += values
         columns["pantograph"] += [place] * len(shown)
         columns["train"] += list(shown)

@@ -295,7 +295,7 @@ class AtRest:
         xarray.Dataset
             ``height`` (wire, x) [m] and ``elasticity`` (x) [m/N]; per unit of each parameter
             ``by_height`` (parameter, wire, x), ``by_elasticity`` (parameter, x) and
-            ``by_unevenness`` (parameter), which is (max - min) / (max + min) of the elasticity
+            ``by_non_uniformity`` (parameter), which is (max - min) / (max + min) of the elasticity
             along the span; ``unit`` (parameter) of its key. Its attribute ``left_out`` has
             sentences on usual parameters by which the line has no derivative.
 
@@ -324,7 +324,7 @@ class AtRest:
             name = f"change of {of['long_name']} by one unit of the parameter"
             return {"units": f"{of['units']} per unit of the parameter", "long_name": name}
 
-        uneven = {"units": "1", "long_name": "unevenness of the elasticity"}
+        uneven = {"units": "1", "long_name": "non-uniformity of the elasticity"}
         return xr.Dataset(
             {
                 "height": (("wire", "x"), found.height.T, height),
@@ -335,7 +335,7 @@ class AtRest:
                     per_unit(height),
                 ),
                 "by_elasticity": (("parameter", "x"), found.by_elasticity, per_unit(lift)),
-                "by_unevenness": ("parameter", found.by_unevenness, per_unit(uneven)),
+                "by_non_uniformity": ("parameter", found.by_non_uniformity, per_unit(uneven)),
                 "unit": ("parameter", [one.unit for one in found.parameters]),
             },
             {

@@ -85,7 +85,7 @@ def list_cases(
 
         from catenary.cases.terminal.lists import scene_schema
 
-        console.say(json.dumps(scene_schema(), indent=1))
+        console.say(json.dumps(scene_schema(), indent=1), whole=True)
         return
     if pantographs:
         from catenary.cases.terminal.terminal_text import pantograph_table

@@ -145,7 +145,7 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
     if as_json:
         from catenary.postproc.report.study_table import json_text
 
-        console.say(json_text(output.record_of(found)).rstrip())
+        console.say(json_text(output.record_of(found)).rstrip(), whole=True)
     else:
         print_findings(output.as_text(found), files)
     return console.DONE

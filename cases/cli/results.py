@@ -101,17 +101,18 @@ def report(
         costs = measured_costs(scene, cost), str(cost)
     entries, text = full_sections(scene, costs, statement), scene and scene.input_text
     beside = {INPUT: text} if text else {}
-    written = write_report(
-        folder,
-        folder,
-        records,
-        entries,
-        beside,
-        measured=measured,
-        vector=True,
-        on_paper=pdf,
-        interactive=interactive,
-    )
+    with console.waiting("report"):
+        written = write_report(
+            folder,
+            folder,
+            records,
+            entries,
+            beside,
+            measured=measured,
+            vector=True,
+            on_paper=pdf,
+            interactive=interactive,
+        )
     console.say("\n".join(str(path) for path in written.files))
 
 

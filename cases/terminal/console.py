@@ -10,7 +10,8 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, TextIO, get_args, get_origin, get_type_hints
 
@@ -23,6 +24,7 @@ from catenary.base.lone_process import world as world
 from catenary.base.options import Flag, command_line
 from catenary.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 from catenary.cases.scene.input.plain_text import plain, shown
+from catenary.postproc.evaluate.terminal_width import folded, terminal_width
 from catenary.postproc.files.disk_errors import reason
 
 DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
@@ -72,13 +74,14 @@ def is_quiet() -> bool:
     return _quiet
 
 
-def say(text: str) -> None:
+def say(text: str, *, whole: bool = False) -> None:
     """Print to standard output on rank 0, unless the verb is to be quiet. Not collective.
 
     Titles and names out of files of strangers do not steer the terminal: what would is escaped.
+    Sentences are folded at the width of a terminal, but not of text that is to stay ``whole``.
     """
     if speaks() and not _quiet:
-        print_as_is(shown(text) + "\n")
+        print_as_is(folded(shown(text), None if whole else terminal_width()) + "\n")
 
 
 def print_as_is(text: str) -> None:
@@ -109,8 +112,9 @@ def warn(sentence: str) -> None:
 
 def _print_error(head: str, sentence: str) -> None:
     """Print a sentence to standard error; where that cannot be written to nobody hears it."""
+    line = head + plain(" ".join(sentence.split()))
     try:
-        typer.echo(head + plain(" ".join(sentence.split())), err=True)
+        typer.echo(folded(line, terminal_width(sys.stderr)), err=True)
     except OSError:
         _discard(sys.stderr)
 
@@ -120,6 +124,19 @@ def _discard(stream: TextIO) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """While entered, a terminal shows what is made, in a line that goes. Not collective."""
+    is_shown = speaks() and not _quiet and sys.stderr.isatty()
+    try:
+        if is_shown:
+            print(f"\r{what} ...\x1b[K", end="", file=sys.stderr, flush=True)
+        yield
+    finally:
+        if is_shown:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
 def open_closed_streams() -> None:

@@ -21,6 +21,7 @@ from catenary.cases.scene.keys.table import OneOrMore
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
 from catenary.cases.scene.scene import Scene
+from catenary.postproc.evaluate.terminal_width import terminal_width
 from catenary.postproc.standards.book import Rule, RuleBook
 from catenary.postproc.standards.library import DEFAULT, book_named, editions_of, shipped
 from catenary.postproc.standards.quantities import QUANTITIES, SYSTEMS
@@ -105,11 +106,17 @@ def _default(field: FieldInfo) -> str:
 
 
 def key_table() -> str:
-    """Every key of a scene: name, unit, default, meaning; one line each."""
-    rows = []
+    """Every key of a scene: name, unit, default, meaning; one line each, and on a terminal the
+    meaning below, which is wider than that."""
+    rows, is_shown = [], terminal_width() is not None
     for key in keys_of_a_scene():
         some = f" ({', '.join(key.kinds)})" if key.kinds else ""
-        rows.append(f"{key.name:52} {key.unit:8} {key.default:12} {key.meaning}{some}")
+        about = f"{key.name:52} {key.unit:8} {key.default:12}"
+        rows += (
+            [about.rstrip(), *_folded(f"{key.meaning}{some}")]
+            if is_shown
+            else [f"{about} {key.meaning}{some}"]
+        )
     return "\n".join(rows)
 
 
@@ -160,7 +167,7 @@ def _details(key: Key) -> str:
         lines.append(f"usual: {low:.12g} to {high:.12g}")
     lines += _about_effect(key.name)
     wrapped = [
-        textwrap.fill(line, 96, initial_indent="    ", subsequent_indent="      ")
+        textwrap.fill(line, _width(), initial_indent="    ", subsequent_indent="      ")
         for line in lines
         if line
     ]
@@ -260,7 +267,8 @@ def book_table() -> str:
     default, rows = book_named(DEFAULT).key, []
     for key, book in shipped().items():
         note = " (where a scene names none)" if key == default else ""
-        rows.append(f"{key:18} {len(book.criteria):2} criteria  {book.title}{note}")
+        noun = "criterion" if len(book.criteria) == 1 else "criteria"
+        rows.append(f"{key:18} {len(book.criteria):2} {noun:9} {book.title}{note}")
     return "\n".join(rows)
 
 
@@ -300,7 +308,12 @@ def comparison(book: RuleBook, rule: Rule) -> str:
 
 
 def _folded(text: str) -> list[str]:
-    return textwrap.wrap(text, _WIDTH, initial_indent="    ", subsequent_indent="      ")
+    return textwrap.wrap(text, _width(), initial_indent="    ", subsequent_indent="      ")
+
+
+def _width() -> int:
+    """Columns of folded text, those of a narrower terminal."""
+    return min(_WIDTH, terminal_width() or _WIDTH)
 
 
 def scene_schema() -> dict[str, Any]:

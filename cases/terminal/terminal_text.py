@@ -48,7 +48,7 @@ def summary_text(
         f"{end:g} m",
         "",
         f"  {'pantograph':12}{'mean':>8}{'std':>8}{'max':>8}{'min':>8}{'stat max':>10}"
-        f"{'stat min':>10}  [N]{'loss':>8} [%]",
+        f"{'stat min':>10}  [N]{'loss':>5} [%]",
     ]
     for i, one in enumerate(summary["pantographs"]):
         figures = [one[f"{name}_N"] for name in ("mean", "std", "max", "min")]
@@ -57,7 +57,7 @@ def summary_text(
             f"  {one.get('name') or i + 1!s:12}"
             + "".join(f"{_number(value):>8}" for value in figures)
             + "".join(f"{_number(value):>10}" for value in limits)
-            + f"{_number(one['loss_percent'], 3):>13}"
+            + f"{_number(one['loss_percent'], 3):>10}"
         )
     droppers = summary["droppers"]
     lines += [
@@ -170,7 +170,7 @@ def elasticity_text(x: np.ndarray, elasticity: np.ndarray) -> str:
     lift = 1e3 * elasticity
     return (
         f"Elasticity from {x.min():g} to {x.max():g} m: {lift.min():.3f} to "
-        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, unevenness "
+        f"{lift.max():.3f} mm/N, mean {lift.mean():.3f} mm/N, non-uniformity "
         f"{100 * (lift.max() - lift.min()) / (lift.max() + lift.min()):.1f} %"
     )
 
@@ -275,17 +275,22 @@ def _registration_text(data: Mapping[str, np.ndarray], wires: Sequence[str]) -> 
     if table is None:
         return []
     head = ("arm at [m]", "stagger [m]", "radial [N]", "lift [N]", "slope [deg]", "along [N]")
-    heads = "".join(f"{name:>12}" for name in (*head, "slew [deg]"))
-    lines = ["", heads + ("  wire" if table.wires else "")]
+    heads = (*head, "slew [deg]")
+    widths = [max(len(name) + 1, 10) for name in heads]
+
+    def row(cells: Sequence[str]) -> str:
+        return "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+
+    lines = ["", row(heads) + ("  wire" if table.wires else "")]
     shown: dict[tuple[str, ...], str] = {}
     for place, *figures in table.rows():
         wire = f"  {figures[-1]}" if table.wires else ""
         if tuple(figures) in shown:
-            lines.append(f"{place:>12} as {shown[tuple(figures)]}{wire}")
+            lines.append(f"{place:>{widths[0]}} as {shown[tuple(figures)]}{wire}")
             continue
         shown[tuple(figures)] = place
         columns = figures[:-1] if table.wires else figures
-        lines.append("".join(f"{figure:>12}" for figure in (place, *columns)) + wire)
+        lines.append(row((place, *columns)) + wire)
     return [*lines, *(f"  {text}" for text in table.warnings()), ""]
 
 

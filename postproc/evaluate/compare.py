@@ -20,6 +20,7 @@ from catenary.postproc.evaluate.span_differences import (
     differences,
     span_sums,
 )
+from catenary.postproc.evaluate.terminal_width import terminal_width
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of, judged_by, labels
 from catenary.postproc.evaluate.wording import (
     UNCOMPARED,
@@ -150,9 +151,14 @@ def _acceptance(*runs: _Evaluated) -> list[str]:
     columns = [dict(zip(labels(criteria), criteria, strict=True)) for criteria in found]
     every = list(dict.fromkeys(label for column in columns for label in column))
     width = max(map(len, every), default=0)
+    room = terminal_width()
+    is_narrow = room is not None and 2 + width + 26 * len(columns) > room
     for label in every:
         cells = [_judged(column.get(label)) for column in columns]
-        lines.append(f"  {label:{width}}" + "".join(f"{cell:>26}" for cell in cells))
+        if is_narrow:
+            lines += [f"  {label}", "  " + "".join(f"{cell:>26}" for cell in cells)]
+        else:
+            lines.append(f"  {label:{width}}" + "".join(f"{cell:>26}" for cell in cells))
     return [*lines, f"  {UNCOMPARED_SAYS}"]
 
 
@@ -183,7 +189,7 @@ def _difference(value: float, digits: int = 4) -> str:
 
 def _by_spans(runs: Sequence[Results]) -> list[str]:
     """Differences from the first run with their intervals, by the spread from span to span."""
-    lines = []
+    rows = []
     n = min(run.n_pantographs for run in runs)
     names = runs[0].pantograph_names()
     of_all = [[_span_sums(run, number) for run in runs] for number in range(n)]
@@ -195,15 +201,13 @@ def _by_spans(runs: Sequence[Results]) -> list[str]:
             found = differences(first, other, paired)
             for label, one in zip(STATISTICS, found or (), strict=False):
                 mark = "more than chance" if one.is_certain else "within chance"
-                whole = f"{one.low:9.3f} to {one.high:9.3f}"
-                lines.append(
-                    f"  {name + ' ' + label + ' [N]':32}{letter + ' - A':>14}{one.value:14.3f}"
-                    f"  {whole}  {mark}"
-                )
-    if lines:
-        head = "differences by the spread from span to span, 95 % intervals"
-        lines.insert(0, head)
-    return lines
+                figures = f"{one.value:8.3f}{one.low:8.3f} to{one.high:7.3f} {mark}"
+                rows.append((f"{name} {label}", f" {letter} - A{figures}"))
+    if not rows:
+        return []
+    width = max(len(label) for label, _ in rows)
+    head = "differences [N] by the spread from span to span, 95 % intervals"
+    return [head, *(f"  {label:{width}}{figures}" for label, figures in rows)]
 
 
 def _span_sums(run: Results, number: int) -> SpanSums | None:

@@ -42,10 +42,13 @@ class Difference(NamedTuple):
 def span_sums(position: np.ndarray, force: np.ndarray, edges: np.ndarray) -> SpanSums:
     """Sums of a force (n,) at positions (n,) [m] between edges (m + 1,) of spans [m].
 
-    Spans without a sample are left out.
+    Spans without a sample are left out. A sample at the last edge belongs to the last span, as it
+    does to the evaluated stretch: means of all spans are those of the stretch.
     """
     n_spans = max(edges.size - 1, 0)
     which = np.searchsorted(edges, position, side="right") - 1
+    if n_spans:
+        which[position == edges[-1]] -= 1
     inside = (which >= 0) & (which < n_spans)
     which, force = which[inside], force[inside]
     sums = [np.bincount(which, weights, n_spans) for weights in (None, force, np.square(force))]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.postproc.channels.places_on_train import in_sentence
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.lateral_places import LateralRange, lateral_ranges
 from catenary.postproc.read.line_of_run import in_stretch
@@ -291,32 +292,28 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
             name=name,
             **_of_force(force, filtered, within, results.dt),
             contact_height_range=_range(results.column("wire_height", number), within, results.dt),
-            unjudged=_unjudged(_noun(name), force[within], results),
+            unjudged=_unjudged(in_sentence(name), force[within], results),
         )
     except InputError as error:
-        complaint = f"No statistics of the {_noun(name)}: {error}."
+        complaint = f"No statistics of {in_sentence(name)}: {error}."
         covered = not isinstance(error, Uncovered)
         return PantographStatistics(name, complaint=complaint, covered=covered)
 
 
-def _unjudged(noun: str, force: np.ndarray, results: Results) -> str:
+def _unjudged(who: str, force: np.ndarray, results: Results) -> str:
     """Reason for not judging a force (n,) of the evaluation stretch, "" if it is judged."""
     if not force.any():
-        return f"Nothing is judged of the {noun}: its contact force is zero all the way."
+        return f"Nothing is judged of {who}: its contact force is zero all the way."
     start, end = results.evaluation
     masts = results.line("support_x")
     spans = np.diff(masts)[(masts[1:] > start) & (masts[:-1] < end)]
     # Lengths of spans come from sums, which round.
     if end - start < spans.min(initial=np.inf) * (1.0 - 1e-9):
         return (
-            f"Nothing is judged of the {noun}: the evaluation stretch of {end - start:.4g} m is "
+            f"Nothing is judged of {who}: the evaluation stretch of {end - start:.4g} m is "
             f"shorter than a span ({spans.min(initial=np.inf):.4g} m)."
         )
     return ""
-
-
-def _noun(name: str) -> str:
-    return name if name == "pantograph" else f"{name} pantograph"
 
 
 def _supports(results: Results) -> SupportStatistics:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -101,10 +102,12 @@ def animate(
             shown = tqdm(
                 made,
                 total=len(made),
-                desc="film",
-                unit="picture",
                 disable=not (progress and sys.stderr.isatty()),
                 file=sys.stderr,
+                leave=False,
+                ncols=min(shutil.get_terminal_size().columns, 100),
+                bar_format="film {percentage:3.0f}% |{bar}| {n} of {total} pictures, left "
+                "{remaining}",
             )
             files = folder / MP4, folder / GIF
             colours = (*COLOURS[: data.n_pantographs], *MOTIONS, *DROPPER_FORCES, SLACK)
@@ -168,10 +171,9 @@ def followed(data: FilmData, camera: str | None) -> list[int]:
         return [data.names.index(camera)]
     if camera.isdigit() and 1 <= int(camera) <= data.n_pantographs:
         return [int(camera) - 1]
-    raise InputError(
-        f"--camera is {camera!r}; this run has {', '.join(map(repr, data.names))}, "
-        f"or a number from 1 to {data.n_pantographs}"
-    )
+    names, n = ", ".join(map(repr, data.names)), data.n_pantographs
+    numbers = f", or a number from 1 to {n}" if n > 1 else " or 1"
+    raise InputError(f"--camera is {camera!r}; it must be {names}{numbers}")
 
 
 class Pictures:
@@ -208,7 +210,12 @@ class Pictures:
         )
         self._dropper_time = results.line_time if results.has("dropper_force") else np.zeros(0)
         self.drawing = drawing.Drawing(
-            scenery, picture, projection, picture.colours(extremes), self._strongest(shown)
+            scenery,
+            picture,
+            projection,
+            picture.colours(extremes),
+            self._strongest(shown),
+            self._followed,
         )
         self.chart: ForceChart | RingingChart
         if isinstance(data.excitation, Blow):

@@ -19,7 +19,14 @@ from matplotlib.figure import Figure
 from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film import scenery as drawn
 from catenary.postproc.film.options import View
-from catenary.postproc.film.projection import EYE, Colours, Picture, Projection, room_above
+from catenary.postproc.film.projection import (
+    EYE,
+    NEAREST,
+    Colours,
+    Picture,
+    Projection,
+    room_above,
+)
 from catenary.postproc.film.scenery import (
     LOOKS,
     PANTOGRAPHS,
@@ -81,6 +88,7 @@ class Drawing:
     projection : of the drawing
     colours : colour scale of the wires
     strongest : largest force of a dropper [N], None if it is not known
+    followed : pantographs that the camera goes with; all if None
     """
 
     def __init__(
@@ -90,7 +98,9 @@ class Drawing:
         projection: Projection,
         colours: Colours,
         strongest: float | None,
+        followed: list[int] | None = None,
     ) -> None:
+        self._followed = slice(None) if followed is None else followed
         self._scenery, self._picture, self._projection = scenery, picture, projection
         self._colours, self._ground = colours, None
         self._parts = _seen_parts(scenery, picture.view)
@@ -226,7 +236,7 @@ class Drawing:
         low, high = span[0] - _NEAR, span[1] + _NEAR
         eye = 0.0
         if view is View.ALONG:
-            eye = data.position[row].max() - EYE
+            eye = data.position[row, self._followed].max() - EYE
             low, high = eye + EYE - _SEEN_BEHIND, eye + EYE + _SEEN_AHEAD
         else:
             self._axes.set_xlim(*span)
@@ -282,14 +292,24 @@ class Drawing:
             along = self._projection.scale.along
             rest[:, 0] = middle + along * (rest[:, 0] - middle)
             moved[:, 0] *= along
-        bodies = seen(rest, moved, eye)[parts[PANTOGRAPHS].cells]
+        cells = parts[PANTOGRAPHS].cells
+        bodies = seen(rest, moved, eye)[cells]
+        before = np.ones(data.n_pantographs, dtype=bool)
+        if self._picture.view is View.ALONG:
+            # Pantographs behind the eye, or beside it, are none of the picture.
+            x = (rest + moved)[:, 0]
+            np.logical_and.at(before, self._scenery.number, x > eye + NEAREST)
+            bodies[~before[self._scenery.number[cells[:, 0]]]] = np.nan
         self.bodies.set_segments(list(bodies))
         above = np.concatenate([wires, bodies]).reshape(-1, 2)
         width = float(np.ptp(self._axes.get_xlim()))
         arrows = []
         tops = seen(*beside[drawn.FORCES], eye)
-        for force, at, text in zip(data.force[row].tolist(), tops, self.values, strict=True):
-            arrow = self._arrow(force) + at
+        for force, at, text, is_seen in zip(
+            data.force[row].tolist(), tops, self.values, before, strict=True
+        ):
+            text.set_visible(is_seen)
+            arrow = self._arrow(force if is_seen else 0.0) + at
             arrows.append(arrow)
             text.set_text(f"{force:.0f} N")
             top = float(arrow[..., 1].max())

@@ -27,7 +27,7 @@ _SMALLEST = 1e-4
 # From the right and above: how far along the track, and up, what is a metre to the left is drawn.
 _DEPTH = 0.25, 0.35
 # From behind: how far the eye is behind the first thing seen, and the nearest that it sees [m].
-EYE, _NEAREST = 12.0, 1.5
+EYE, NEAREST = 12.0, 1.5
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Projection:
         if self.view is View.PLAN:
             return np.column_stack([along, aside])
         if self.view is View.ALONG:
-            near = EYE / np.maximum(along - eye, _NEAREST)
+            near = EYE / np.maximum(along - eye, NEAREST)
             horizon = self.scale.size * self.horizon
             return np.column_stack([-aside * near, horizon + (up - horizon) * near])
         if self.view is View.OBLIQUE:

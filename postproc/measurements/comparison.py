@@ -293,8 +293,8 @@ class _Comparing:
         ):
             chance = "more than chance" if one.is_certain else "within chance"
             self._found.remarks.append(
-                f"{name}: {what}, run - measured, {one.value:+.2f} N with a 95 % interval from "
-                f"{one.low:+.2f} to {one.high:+.2f} N: {chance}"
+                f"{name}: {what}, run - measured, within {one.low:+.2f} to {one.high:+.2f} N with "
+                f"a confidence of 95 %: {chance}"
             )
 
     def _heights(

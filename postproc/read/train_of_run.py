@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from catenary.meshgen.wires import Role
+from catenary.postproc.channels.places_on_train import places_on_train
 from catenary.postproc.read.line_of_run import LineOfRun
 
 
@@ -70,9 +71,8 @@ class TrainOfRun(LineOfRun):
             return ["pantograph"]
         first = self.first_position if self._file.records.rows[0] else -np.arange(n, dtype=float)
         names = [""] * n
-        for place, index in enumerate(np.argsort(-first, kind="stable")):
-            middle = f"no. {place + 1}"
-            names[index] = "leading" if place == 0 else "trailing" if place == n - 1 else middle
+        for name, index in zip(places_on_train(n), np.argsort(-first, kind="stable"), strict=True):
+            names[index] = name
         return names
 
     @property

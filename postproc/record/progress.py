@@ -76,7 +76,7 @@ class Progress(Observer):
         self._total = stage.n_steps * stage.dt - stage.start_time
         self._begin = self._clock_read_at = self._line_at = self._clock()
         self._step = round(stage.start_time / stage.dt)
-        self._done, self._lines = 0.0, 0
+        self._done, self._lines, self._is_first_look = 0.0, 0, True
         self._next_look = self._step + 1
         if self._on_terminal:
             from tqdm import tqdm  # not loaded where nobody looks on
@@ -87,6 +87,7 @@ class Progress(Observer):
                 unit="s",
                 desc="march",
                 file=self._stream,
+                leave=False,
                 mininterval=0.1,
                 ncols=min(shutil.get_terminal_size().columns, 100),  # 80 if it does not say
                 bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.2f}/{total:.2f} s simulated"
@@ -108,7 +109,11 @@ class Progress(Observer):
         self._step, self._clock_read_at = view.step, now
         done = view.time - self._start
         factor = done / max(now - self._begin, 1e-9)
-        if self._bar is not None:
+        if self._bar is not None and self._is_first_look:
+            # The first step also makes what later ones use: its time would foretell hours.
+            self._bar.unpause()
+            self._begin, self._is_first_look = now, False
+        elif self._bar is not None:
             self._bar.set_postfix_str(f"{factor:.1f} x real time", refresh=False)
             self._bar.update(done - self._done)
         elif now - self._line_at >= LINE_EVERY and factor > 0:

@@ -27,6 +27,8 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import RunBroken
+from catenary.postproc.channels.places_on_train import in_sentence, places_on_train
+from catenary.postproc.evaluate.wording import capital
 from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
@@ -102,6 +104,7 @@ class RunWatch(Observer):
         self._arm_x = stage.arm_x[stage.owned_arms]
         self._lost_since = np.full(stage.n_pantographs, np.nan)
         self._lost_at = np.zeros(stage.n_pantographs)
+        self._names = [in_sentence(place) for place in places_on_train(stage.n_pantographs)]
 
     def next_state(self, step: int) -> int:
         """The step of the next look; rows of others will do."""
@@ -125,7 +128,7 @@ class RunWatch(Observer):
             if f"lost {p}" in self._reported:
                 self._say(
                     f"lost for good {p}",
-                    f"Pantograph {p + 1} touches no wire from {self._lost_since[p]:.4g} s, "
+                    f"{capital(self._names[p])} touches no wire from {self._lost_since[p]:.4g} s, "
                     f"{self._lost_at[p]:.4g} m on to the end of the run.",
                 )
 
@@ -246,7 +249,7 @@ class RunWatch(Observer):
             if places[-1, p] - self._lost_at[p] > self._span:
                 self._say(
                     f"lost {p}",
-                    f"Pantograph {p + 1} has not touched a wire for more than a span, from "
+                    f"{capital(self._names[p])} has not touched a wire for more than a span, from "
                     f"{self._lost_since[p]:.4g} s, {self._lost_at[p]:.4g} m on.",
                 )
 
@@ -302,9 +305,9 @@ class StripWatch(Observer):
                 row = int(np.argmax(beyond))
                 x = view.each("contact_position")[row, p]
                 strip_logger.warning(
-                    "a contact wire leaves the strips of pantograph %d at %.4g s, %.4g m: they end "
+                    "a contact wire leaves the strips of %s at %.4g s, %.4g m: they end "
                     "%.3g m beside their middle; contact goes on as if it stayed on them",
-                    p + 1,
+                    in_sentence(places_on_train(len(self._contacts))[p]),
                     view.times[row],
                     x,
                     half,

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 _TEMPLATES = Path(__file__).parent / "templates"
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=%|(?:N|mm|m|km/h|Hz|s)\b)")
+# A figure with its unit, which stay on one line.
+_FIGURE = re.compile(r"(?<=\d) (%|(?:N|kN|mm|m|km|kg|Hz|s|J)(?:/[A-Za-z]{1,2})?)(?![\w/])")
+# A unit behind its figure, or in brackets.
+_UNIT = re.compile(r"(?<=\xa0)\w+/\w+|\[\w+/\w+\]")
 # Cells of tables that are coloured.
 _MARKS = {
     "passed": "yes", "failed": "no", "yes": "yes", "no": "no", "?": "unknown",
@@ -77,19 +80,23 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["minus"] = lambda value: with_minus(str(value))
     environment.filters["commands"] = _with_commands
     environment.filters["unit_whole"] = _with_whole_unit
     return environment.get_template("page.html.j2")
 
 
-def _with_commands(text: str) -> Any:
+def _whole(text: str) -> str:
+    """Text in which no line ends between a figure and its unit, or within the unit."""
+    text = _FIGURE.sub("\N{NO-BREAK SPACE}\\1", text)
+    return _UNIT.sub(lambda found: found[0].replace("/", "/\N{WORD JOINER}"), text)
+
+
+def _with_commands(text: Any) -> Any:
     """A sentence as HTML, in which what stands between back quotes is a command."""
     from markupsafe import Markup, escape
 
-    # A figure stays on the line of its unit.
-    words = _BEFORE_UNIT.sub("\u00a0", str(escape(with_minus(text)))).split("`")
-    return Markup("".join(f"<code>{w}</code>" if n % 2 else w for n, w in enumerate(words)))
+    words = str(escape(with_minus(str(text)))).split("`")
+    return Markup("".join(f"<code>{w}</code>" if n % 2 else _whole(w) for n, w in enumerate(words)))
 
 
 def _with_whole_unit(head: str) -> Any:

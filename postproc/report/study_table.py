@@ -10,12 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from catenary.postproc.evaluate.terminal_width import terminal_width
 from catenary.postproc.evaluate.wording import without_sign_of_zero
 from catenary.postproc.files.csv_text import csv_text, number_text
 
 Row = Mapping[str, Any]
 # More runs than this are not named one by one if a remark is of them all.
 _NAMED = 4
+# Blanks between columns on a terminal, and columns that words have at least if they are folded.
+_GAP, _LEAST_WORDS = 2, 20
 
 
 class Column(NamedTuple):
@@ -48,6 +51,81 @@ class Column(NamedTuple):
         # A count has no decimals among figures that have some.
         form = re.sub(r"\.\d+f$", "d", self.format) if isinstance(value, int) else self.format
         return without_sign_of_zero(format(value, form))
+
+
+class _Drawn(NamedTuple):
+    """A column as a terminal shows it: head, cells, and whether it stands at the right."""
+
+    head: str
+    cells: list[str]
+    is_right: bool
+
+    def width(self, is_folded: bool) -> int:
+        """Columns of the terminal that it takes, with a head that is folded at its words or not."""
+        from rich.cells import cell_len
+
+        heads = self.head.split() if is_folded else [self.head]
+        return max(cell_len(text) for text in [*self.cells, *heads, ""])
+
+
+def _pieces(columns: list[_Drawn], width: int | None) -> list[str]:
+    """The columns as a table, and where that is wider than ``width`` in pieces below each other.
+
+    Each piece has the columns that name a row. It stays in one where these leave no room beside
+    them, and where nobody looks on: what is folded cannot be searched for.
+    """
+    whole = sum(one.width(False) + _GAP for one in columns) - _GAP
+    n_names = _names_of_rows(columns)
+    names, others = columns[:n_names], columns[n_names:]
+    left = sum(one.width(True) + _GAP for one in names)
+    # Words at the left are folded, figures are not.
+    least = [
+        one.width(True) if one.is_right else min(one.width(True), _LEAST_WORDS) for one in others
+    ]
+    if width is None or whole <= width or not n_names or left + max(least, default=0) > width:
+        return [_rendered(columns, len(columns), whole)]
+    pieces, taken = [[*names]], left
+    for one, own in zip(others, least, strict=True):
+        if len(pieces[-1]) > n_names and taken + own > width:
+            pieces.append([*names])
+            taken = left
+        pieces[-1].append(one)
+        taken += own + _GAP
+    return [_rendered(piece, n_names, width) for piece in pieces]
+
+
+def _names_of_rows(columns: list[_Drawn]) -> int:
+    """How many columns of words name each row, as variant and pantograph do; 0 if two do not."""
+    for n in (1, 2):
+        rows = list(zip(*(one.cells for one in columns[:n]), strict=True))
+        if len(set(rows)) == len(rows) and not any(one.is_right for one in columns[1:n]):
+            return n
+    return 0
+
+
+def _rendered(columns: list[_Drawn], n_whole: int, room: int) -> str:
+    """Columns in ``room``, figures and the first ``n_whole`` ones in a line for each row."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    is_folded = n_whole < len(columns)
+    table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0), header_style="")
+    for number, one in enumerate(columns):
+        is_whole = one.is_right or number < n_whole
+        table.add_column(
+            Text(one.head, no_wrap=not is_folded),
+            justify="right" if one.is_right else "left",
+            no_wrap=is_whole,
+            width=one.width(True) if is_folded and is_whole else None,
+        )
+    for cells in zip(*(one.cells for one in columns), strict=True):
+        table.add_row(*(Text(cell) for cell in cells))
+    stream = io.StringIO()
+    # Of a width that is known there is none to be taken from the terminal.
+    console = Console(file=stream, width=max(room, 1), color_system=None, force_jupyter=False)
+    console.print(table)
+    return "\n".join(line.rstrip() for line in stream.getvalue().splitlines())
 
 
 @dataclass(frozen=True)
@@ -110,25 +188,21 @@ class StudyTable:
         return rows
 
     def text(self) -> str:
-        """The table for a terminal."""
-        from rich.console import Console
-        from rich.table import Table
-        from rich.text import Text
-
-        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="")
-        for column in self.for_people:
-            justify: Any = "right" if column.format else "left"
-            table.add_column(Text(column.head), justify=justify, no_wrap=True)
-        table.add_column()
+        """The table for a terminal: in one piece, or in pieces that its width holds."""
+        people, width = self.for_people, terminal_width()
+        columns: list[list[str]] = [[] for _ in people]
+        behind = []
         for row, cells in zip(self.rows, self.texts("-"), strict=True):
-            behind = "" if _is_done(row) else cells[1]
-            shown = cells if _is_done(row) else cells[:1]
-            padded = [*shown, *[""] * (len(cells) - len(shown)), behind]
-            table.add_row(*(Text(cell) for cell in padded))
-        # Wide enough for any row: what is folded cannot be searched for.
-        stream = io.StringIO()
-        Console(file=stream, width=10_000, color_system=None, force_jupyter=False).print(table)
-        return "\n".join(line.rstrip() for line in stream.getvalue().splitlines())
+            shown = cells if _is_done(row) else [cells[0], *[""] * (len(cells) - 1)]
+            for own, text in zip(columns, shown, strict=True):
+                own.append(text)
+            behind.append("" if _is_done(row) else cells[1])
+        drawn = [
+            _Drawn(own.head, cells, bool(own.format))
+            for own, cells in zip(people, columns, strict=True)
+        ]
+        drawn += [_Drawn("", behind, False)] * any(behind)
+        return "\n\n".join(_pieces(drawn, width))
 
     def markdown(self) -> str:
         """The table of a page, without columns that are empty in all rows."""
@@ -232,6 +306,8 @@ def json_text(record: Mapping[str, Any]) -> str:
 def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     """Lines for below a table, each remark once with the runs that it is of; none without remarks.
 
+    Of many remarks that differ in numbers alone, the first stands for all.
+
     Parameters
     ----------
     runs : iterable of tuple
@@ -242,7 +318,24 @@ def remark_lines(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     for name, remarks in named:
         for text in dict.fromkeys(remarks):
             names.setdefault(text, []).append(name)
-    return [f"REMARK      {_of(own, len(named))}: {text}" for text, own in names.items()]
+    lines = []
+    for texts in alike(names):
+        if len(texts) > _NAMED:
+            runs_of = dict.fromkeys(name for text in texts for name in names[text])
+            first = names[texts[0]][0]
+            whose = f"{len(runs_of)} of {len(named)} runs, here the numbers of {first}"
+            lines.append(f"REMARK      {whose}: {texts[0]}")
+        else:
+            lines += [f"REMARK      {_of(names[text], len(named))}: {text}" for text in texts]
+    return lines
+
+
+def alike(remarks: Iterable[str]) -> list[list[str]]:
+    """Remarks that differ in their numbers alone, together, in the order of the first of each."""
+    groups: dict[str, list[str]] = {}
+    for text in remarks:
+        groups.setdefault(re.sub(r"\d[\d.]*(?:e[-+]?\d+)?", "0", text), []).append(text)
+    return list(groups.values())
 
 
 def _of(names: Sequence[str], n_runs: int) -> str:

@@ -41,7 +41,7 @@ def book_named(name: str) -> RuleBook:
     editions = [book for book in known.values() if book.name == name]
     if editions:
         return max(editions, key=lambda book: book.edition)
-    near = difflib.get_close_matches(name[:100], known, n=1)
+    near = difflib.get_close_matches(name[:100].lower(), known, n=1)
     meant = f"did you mean {near[0]}? It" if near else "it"
     raise InputError(
         f"there is no rule book of that name; {meant} must be one of {', '.join(known)}"

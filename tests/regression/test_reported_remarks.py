@@ -62,7 +62,7 @@ def test_hard_cases_tell_what_their_marches_tell(tmp_path: Path) -> None:
     says = "has not touched a wire for more than a span"
     assert "REMARK      lost_over_spans, lost_over_spans" in done.stdout
     for text in (done.stdout, (tmp_path / "hard" / "hard.md").read_text()):
-        assert "lost_over_spans at half the step: Pantograph 1" in text and says in text
+        assert "lost_over_spans at half the step: The pantograph" in text and says in text
     with (tmp_path / "hard" / "hard.csv").open(encoding="utf-8") as file:
         (row,) = [row for row in csv.DictReader(file) if row["criterion"] == "remarks"]
     assert int(row["value"]) >= 2 and says in row["note"]

@@ -47,7 +47,7 @@ def test_a_wire_that_leaves_a_strip_is_named_everywhere(tmp_path: Path) -> None:
 
     # Once, under way.
     told = [line for line in done.stderr.splitlines() if "leaves the strips" in line]
-    assert len(told) == 1 and f"of pantograph 1 at {where}" in told[0]
+    assert len(told) == 1 and f"of the pantograph at {where}" in told[0]
     assert f"they end {HALF:.3g} m beside their middle" in told[0]
 
     summary = json.loads((out / "summary.json").read_text())

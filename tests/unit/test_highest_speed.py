@@ -24,6 +24,7 @@ from catenary.cases.studies.questions.highest_speed import (
     KEY,
     SpeedStudy,
     as_text,
+    draw,
     find_speeds,
     table_of_criteria,
 )
@@ -204,6 +205,19 @@ def test_a_line_without_mirror_image_is_judged_one_way(monkeypatch: pytest.Monke
 def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
     done = invoke("speed", CASE, *words)
     assert done.exit_code == 2 and told in done.output
+
+
+def test_limits_of_a_panel_are_told_apart() -> None:
+    """Two of the deviation by name and dashes, which a print without colours shows."""
+    draft = read_draft(CASE, ("train.end_m=400", "evaluation.from_m=300", "evaluation.to_m=390"))
+    marching = Marching(draft, None, MPI.COMM_SELF, AS_USUAL)
+    figure = draw(find_speeds(marching, draft.scene(), Speeds(250, 260, 10, 10), ()))
+    assert figure is not None
+    deviation, *others = (
+        {line.get_label(): line.get_linestyle() for line in axes.lines} for axes in figure.axes
+    )
+    assert deviation["limit, 0.3 of the mean"] != deviation["limit, 0.3 of the allowed mean"]
+    assert all("limit" in labels for labels in others)
 
 
 @pytest.mark.study

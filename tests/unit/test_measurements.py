@@ -372,13 +372,14 @@ def test_a_difference_from_a_measurement_has_its_interval(run: Path, table: pd.D
     """A constant of 3 N is more than chance in the mean; 2 N of noise change the deviation by
     2^2 / (2 * 26) = 0.08 N. An interval holds what was added."""
     shifted = table.assign(force_N=table.force_N + 3.0)
-    said = [text for text in found_in(run, shifted).remarks if "95 % interval" in text]
+    said = [text for text in found_in(run, shifted).remarks if "confidence of 95 %" in text]
     mean, deviation = said
-    words = r"([-+][0-9.]+) N with a 95 % interval from ([-+][0-9.]+) to ([-+][0-9.]+) N: (.*)"
-    value, low, high, chance = re.search(words, mean).groups()  # type: ignore[union-attr]
+    words = r"within ([-+][0-9.]+) to ([-+][0-9.]+) N with a confidence of 95 %: (.*)"
+    low, high, chance = re.search(words, mean).groups()  # type: ignore[union-attr]
     assert mean.startswith("pantograph: mean, run - measured") and chance == "more than chance"
     assert float(low) <= -3.0 <= float(high)
-    check("mean", float(value), -3.0, within=0.5)
+    # The figures of the table have the difference; an interval is about it.
+    check("mean", 0.5 * (float(low) + float(high)), -3.0, within=0.5)
     assert deviation.startswith("pantograph: standard deviation, run - measured")
 
 
@@ -393,7 +394,10 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
     assert float(mean[6]) == pytest.approx(float(mean[4]) - float(mean[2]), abs=2e-4)
     by_spans = [line for line in lines if line.endswith(("within chance", "more than chance"))]
     assert len(by_spans) == 4
-    assert by_spans[-1].split("[N]")[1].split()[0] == "C"
+    # The stretch is of whole spans, its last record included: both tables have one difference.
+    *_, again = (line for line in by_spans if line.startswith("  pantograph mean"))
+    assert float(again.split("C - A")[1].split()[0]) == pytest.approx(float(mean[6]), abs=6e-4)
+    assert by_spans[-1].startswith("  pantograph standard deviation C - A")
     assert sum("Largest difference" in line for line in lines) == 1
     assert any(line.startswith("C - A: The runs differ") for line in lines)
 
@@ -411,8 +415,8 @@ def test_part_of_a_span_is_no_sample_of_a_difference(run: Path, tmp_path: Path) 
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         rows = int(np.searchsorted(file["channels/contact_position"][:, 0], 400.0))
         file[COMPLETE][...] = [rows, 0, rows]
-    assert "differences by the spread" in compare(run, run)
-    assert "differences by the spread" not in compare(run, tmp_path)
+    assert "differences [N] by the spread" in compare(run, run)
+    assert "differences [N] by the spread" not in compare(run, tmp_path)
 
 
 def test_a_validation_takes_a_comparison_as_its_line_test(

@@ -294,7 +294,7 @@ def test_derivatives_at_rest_say_what_they_are_and_what_is_left_out(
         "elasticity": "m/N",
         "by_height": "m per unit of the parameter",
         "by_elasticity": "m/N per unit of the parameter",
-        "by_unevenness": "1 per unit of the parameter",
+        "by_non_uniformity": "1 per unit of the parameter",
     }
     assert all(found[name].long_name for name in (*found.data_vars, "x") if name != "unit")
 

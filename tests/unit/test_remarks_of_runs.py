@@ -23,6 +23,15 @@ def test_many_runs_are_counted_if_a_remark_is_of_them_all() -> None:
     assert remark_lines((name, ["lost"]) for name in "ab") == ["REMARK      a, b: lost"]
 
 
+def test_many_remarks_with_other_numbers_are_one() -> None:
+    told = [(f"v{speed}", [f"at {speed}.5 km/h a mesh is coarse"]) for speed in range(300, 306)]
+    assert remark_lines([("v200", ["lost"]), *told]) == [
+        "REMARK      v200: lost",
+        "REMARK      6 of 7 runs, here the numbers of v300: at 300.5 km/h a mesh is coarse",
+    ]
+    assert len(remark_lines(told[:3])) == 3
+
+
 def test_tables_of_hard_cases_have_the_remarks_on_them() -> None:
     cases = hard_cases(["undamped_line", "four"])
     found = [Criterion(case.name, "everything is finite", 1.0, 1.0, True) for case in cases]

@@ -174,6 +174,7 @@ def test_what_is_refused(name: str) -> None:
 def test_list_tells_books_and_their_criteria() -> None:
     told = invoke("list", "--rules").output
     assert "en50367:2020       11 criteria  EN 50367:2020 (where a scene names none)" in told
+    assert "jr                  1 criterion " in told
     assert len(told.splitlines()) >= 10
     told = invoke("list", "--rules", "en50119").output
     assert "limit > 0 N" in told and "not compared with the text of the standard" in told
@@ -184,5 +185,7 @@ def test_list_tells_books_and_their_criteria() -> None:
 def test_list_refuses_an_unknown_book_and_two_lists() -> None:
     done = invoke("list", "--rules", "en 50119")
     assert done.exit_code == 2 and '"en 50119": there is no rule book of that name' in done.output
+    done = invoke("list", "--rules", "EN50367")
+    assert done.exit_code == 2 and "did you mean en50367:20" in done.output
     both = invoke("list", "--rules", "--keys")
     assert both.exit_code == 2 and "--keys and --rules" in both.output

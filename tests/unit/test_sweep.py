@@ -295,6 +295,15 @@ def test_rows_have_one_line_per_pantograph_and_one_per_broken_variant() -> None:
     assert "BROKE: it broke" in as_text(ended)
 
 
+def test_names_of_criteria_that_failed_are_told_apart() -> None:
+    """Their names have commas."""
+    one = fake("a", {"k": "1"}, 10.0)
+    names = ["standard deviation, 0.3 of the mean", "arcing NQ"]
+    one.summary["acceptance"] = [{"criterion": name, "passed": False} for name in names]
+    one.summary["passed"] = False
+    assert f"FAILED {'; '.join(names)}" in as_text([one])
+
+
 def test_each_row_names_its_variant_where_keys_are_varied_beside_named_ones(
     tmp_path: Path,
 ) -> None:
@@ -334,6 +343,8 @@ def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
         "leading, law hard": [(200.0, 200.0), (300.0, 300.0)],
         "leading, law soft": [(200.0, 200.0), (300.0, 300.0)],
     }
+    looks = [(line.get_marker(), line.get_linestyle()) for line in figure.axes[0].get_lines()]
+    assert looks == [("o", "-"), ("s", "--")]  # a print without colours tells them apart
     assert figure.axes[1].get_xlabel() == "train speed [km/h]"
     assert figure.axes[0].get_ylabel() == "standard deviation,\n0-20 Hz [N]"
     assert figure.axes[1].get_ylabel() == "largest uplift at\narms [mm]"
@@ -383,7 +394,7 @@ def test_what_failed_is_told_by_name(tmp_path: Path) -> None:
     [
         ("line.contact_wire.tension_N", "contact wire: tension [N]"),
         ("contact.stiffness_N_per_m", "contact: stiffness [N/m]"),
-        ("pantographs.lumped.static_force_N", "lumped: force on the wire at rest [N]"),
+        ("pantographs.lumped.static_force_N", "lumped: static contact force [N]"),
         ("mesh.elements_per_gap", "mesh: elements per gap"),
         ("named", "named"),
     ],

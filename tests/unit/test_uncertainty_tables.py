@@ -179,6 +179,7 @@ def test_pictures_show_their_runs(sample: dict[str, Any] | None) -> None:
     assert scatter is not None
     std = next(axes for axes in scatter.axes if "standard" in axes.get_ylabel())
     assert [len(line.get_xdata()) for line in std.lines] == [30, 30]
+    assert [line.get_marker() for line in std.lines] == ["o", "s"]
     assert std.lines[0].get_xdata() == pytest.approx(table.of("std_N")["first"][SPEED])
     parallel = output.parallel_coordinates(table, ["std_N"])
     assert parallel is not None
@@ -186,7 +187,8 @@ def test_pictures_show_their_runs(sample: dict[str, Any] | None) -> None:
     assert len(lines.get_segments()) == 30
     convergence = output.convergence(table, ["std_N"])
     assert convergence is not None
-    mean = convergence.axes[0].lines[0]
+    mean, _, _, quantile, *_ = convergence.axes[0].lines
+    assert mean.get_marker() != quantile.get_marker()
     worst = table.of("std_N")["second"]["std_N"]  # by 5 N
     assert mean.get_ydata()[-1] == pytest.approx(worst.mean())
     assert convergence.axes[0].get_title(loc="left") == "second, the worst one"

@@ -126,7 +126,10 @@ TWO = 'train.pantographs=[{name="reference"}, {name="reference", behind_m=200}]'
         (["line.n_spans=14"], []),
         (["line.n_spans=13"], ["the pantograph at 591 m (7.2 s)", "line.n_spans = 14,"]),
         (["line.n_spans=12"], ["the pantograph at 547 m (6.6 s)", "evaluation.to_m = 547 at most"]),
-        (["train.start_m=290", TWO], ["Pantograph 1 starts 70 m, 1.2 spans", "from_m = 524"]),
+        (
+            ["train.start_m=290", TWO],
+            ["The leading pantograph starts 70 m, 1.2 spans", "from_m = 524"],
+        ),
         (["train.start_m=200"], ["starts 160 m, 2.7 spans", "train.start_m = 126 at most"]),
         (["evaluation.to_m=400"], ["stretch of 40 m is shorter than a span (60 m)", "= 420"]),
     ],

@@ -37,10 +37,10 @@ class WaveWords(SceneWords):
 @serial_verb(
     "waves",
     help="Analyse wave propagation along a line. A train, a moving force, a pulse or a hammer "
-    "excites them: motion in space and time, in the frame of the train, and over "
-    "wavenumber and frequency, energy ahead and behind, beside the waves, pass bands and "
-    "group velocities of the periodic line. `catenary separation` shows how two pantographs "
-    "act on each other.",
+    "excites the line. Pictures show its motion in space and time, in the frame of the train, "
+    "and over wavenumber and frequency, its energy ahead and behind, and pass bands and group "
+    "velocities of the periodic line. `catenary separation` shows how two pantographs act on "
+    "each other.",
     epilog="Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves; "
     "catenary waves en50318_2002 --excite hammer --at-m 630 -o results/hammer",
 )

@@ -21,7 +21,8 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of, wave_of_two_spans
 from catenary.meshgen.wires import Wire
-from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.channels.places_on_train import in_sentence, places_on_train
+from catenary.postproc.evaluate.wording import capital, counted
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Periodic
 from catenary.solver.problem.problem import Problem
@@ -175,9 +176,7 @@ def _traced(problem: Problem) -> Traced:
         _in_window(_without_let_out(arrivals(line, course), problem.ends), line, course, problem)
         for course in courses
     )
-    n = len(starts)
-    names = tuple("pantograph" if n == 1 else f"pantograph {i + 1}" for i in range(n))
-    return Traced(line, courses, found, names)
+    return Traced(line, courses, found, tuple(places_on_train(len(starts))))
 
 
 def _without_let_out(found: Arrivals, ends: tuple[EndCondition, EndCondition]) -> Arrivals:
@@ -269,7 +268,7 @@ def _reflections(scene: Scene, traced: Traced) -> list[str]:
         fits = met.at - first >= traced.line.span
         shorter = f", or evaluation.to_m = {math.floor(met.at):g} at most" if fits else ""
         sentences.append(
-            f"The reflection from the end of the line reaches {_object(traced.names[i])} at "
+            f"The reflection from the end of the line reaches {in_sentence(traced.names[i])} at "
             f"{met.at:.0f} m ({met.time:.1f} s){left}, before the evaluated stretch ends "
             f"({first:g} to {last:g} m): its force is not that of a long line. Take {longer}"
             f"{shorter}."
@@ -294,21 +293,13 @@ def _short_run_in(scene: Scene, problem: Problem, traced: Traced) -> list[str]:
         fits = start - (leader - course.rear) >= first
         remedy = f"train.start_m = {start:g} at most, or " if fits else ""
         sentences.append(
-            f"{_subject(traced.names[i])} starts {found.run_in:.0f} m, {found.run_in_spans:.1f} "
-            f"spans, before the evaluated stretch: start-up still affects its force by about "
-            f"{100 * found.start_share:.0f} % of sigma, where {100 * SHORT_RUN_IN:.0f} % is the "
-            f"limit. Take {remedy}evaluation.from_m = {begin:g} "
+            f"{capital(in_sentence(traced.names[i]))} starts {found.run_in:.0f} m, "
+            f"{found.run_in_spans:.1f} spans, before the evaluated stretch: start-up still affects "
+            f"its force by about {100 * found.start_share:.0f} % of sigma, where "
+            f"{100 * SHORT_RUN_IN:.0f} % is the limit. Take {remedy}evaluation.from_m = {begin:g} "
             "at least."
         )
     return sentences
-
-
-def _subject(name: str) -> str:
-    return "The pantograph" if name == "pantograph" else name.capitalize()
-
-
-def _object(name: str) -> str:
-    return "the pantograph" if name == "pantograph" else name
 
 
 def _short_stretch(problem: Problem, traced: Traced) -> list[str]:

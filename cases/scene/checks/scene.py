@@ -35,6 +35,7 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.slowest_wave import bends, slowest_wave
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.postproc.channels.places_on_train import in_sentence, places_on_train
 from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
 from catenary.postproc.standards.book import RuleBook, book_of
 from catenary.postproc.standards.library import DEFAULT, book_named, editions_of, shipped
@@ -222,8 +223,9 @@ def _running(scene: Scene, line: LineData) -> Iterator[Fault]:
 def _evaluation(scene: Scene) -> Iterator[Fault]:
     start, end = scene.train.start_m, end_of(scene)
     stretch = scene.evaluation
-    for i, place in enumerate(scene.train.pantographs):
-        who = "the pantograph" if len(scene.train.pantographs) == 1 else f"pantograph {i + 1}"
+    places = scene.train.pantographs
+    for name, place in zip(places_on_train(len(places)), places, strict=True):
+        who = in_sentence(name)
         covers = f"{who} only runs from {start - place.behind_m:g} to {end - place.behind_m:g} m"
         if stretch.from_m < start - place.behind_m - _TINY:
             yield scene.refused("evaluation.from_m", covers)

@@ -36,9 +36,7 @@ _OF_ALL_BODIES = ("constraint_handling", "substeps")
 class _Pressing(Table):
     """Force and place at which a pantograph presses at rest."""
 
-    static_force_N: float | None = Field(
-        None, gt=0, le=1000, description="force on the wire at rest"
-    )
+    static_force_N: float | None = Field(None, gt=0, le=1000, description="static contact force")
     static_force_by_speed: (
         list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None
     ) = Field(

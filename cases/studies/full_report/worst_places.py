@@ -13,6 +13,7 @@ from catenary.cases.studies.full_report.scene_of_run import SceneOfRun
 from catenary.cases.studies.questions.causes import Causes
 from catenary.cases.studies.questions.worst import Passage, Spot, WorstPlaces, worst_places
 from catenary.cases.studies.questions.worst_output import worst_of_each
+from catenary.postproc.channels.places_on_train import in_sentence
 from catenary.postproc.evaluate import filters
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.figures import (
@@ -71,7 +72,7 @@ def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
     if places.passages:
         passage = places.passages[0]
         who = results.pantograph_names()[passage.pantograph]
-        text = f"Contact force of the {_noun(who)} in the worst span and its neighbours."
+        text = f"Contact force of {in_sentence(who)} in the worst span and its neighbours."
         yield Picture("worst_span", text, lambda: _span(results, passage))
     for name, spots, what in (
         ("worst_dropper", places.forces, "Force of the most loaded dropper"),
@@ -80,10 +81,6 @@ def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
         for spot in spots[:1]:
             caption = f"{what}, {spot.place}, as the train passes."
             yield Picture(name, caption, partial(_passage, results, spot))
-
-
-def _noun(name: str) -> str:
-    return name if name == "pantograph" else f"{name} pantograph"
 
 
 @own_style()

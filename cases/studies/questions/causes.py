@@ -226,8 +226,8 @@ class Causes:
             usual = float(np.median([row[column][1] for row in table.values()]))
             if abs(own / usual - 1.0) > _SOFTER:
                 yield (
-                    f"elasticity: {1e3 * own:.3f} mm/N at the {word} place ({at:.0f} m), median "
-                    f"of all spans {1e3 * usual:.3f} mm/N"
+                    f"elasticity: the {word} place ({at:.0f} m) has {1e3 * own:.3f} mm/N, those of "
+                    f"all spans have a median of {1e3 * usual:.3f} mm/N"
                 )
 
     @cached_property

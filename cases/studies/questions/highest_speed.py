@@ -42,6 +42,7 @@ _PANELS = (
     ("min_N", "minimum contact force"),
     ("max_uplift_mm", "contact-wire uplift"),
 )
+_LIMITS = ("--", "-.")
 
 
 class Stretch(NamedTuple):
@@ -380,7 +381,7 @@ def draw(study: SpeedStudy) -> Figure | None:
     figure = figures.new_figure(0.6 + 2.0 * len(_PANELS))
     panels = figure.subplots(len(_PANELS), 1, sharex=True)
     names = list(dict.fromkeys(row["pantograph"] for row in rows))
-    looks = dict(zip(study.directions, ("o-", "s:"), strict=False))
+    looks = dict(zip(study.directions, ("-", ":"), strict=False))
     for (statistic, criterion), axes in zip(_PANELS, panels, strict=True):
         for stretch in study.holds[0].stretches:
             axes.axvspan(stretch.slowest, stretch.fastest, color=figures.SHADE, zorder=0)
@@ -390,22 +391,35 @@ def draw(study: SpeedStudy) -> Figure | None:
         ):
             own = [row for row in rows if (row["pantograph"], row[DIRECTION]) == (name, way)]
             y = [np.nan if row[statistic] is None else row[statistic] for row in own]
-            label = None if of_line else f"{name}, {way}" if len(looks) > 1 else name
-            figures.curve(axes, [row[KEY] for row in own], y, number, label, look)
-        # Limits of all criteria whose names begin so, as one look of dashed lines.
-        for places in _limits(study, criterion):
-            axes.plot(*zip(*places, strict=True), "--", color=figures.LIMIT, linewidth=1.0)
+            label = f"{name}, {way}" if len(looks) > 1 else name
+            label = label if axes is panels[0] else None
+            speeds = [row[KEY] for row in own]
+            # The line has a look of its own among several pantographs.
+            shown = 2 if of_line and len(names) > 1 else number
+            figures.curve(axes, speeds, y, shown, label, figures.mark(shown) + look)
+        limits = _limits(study, criterion, names)
+        # Those of all pantographs and both directions have one look and name.
+        rests = list(dict.fromkeys(rest for rest, _ in limits))
+        for number, (rest, places) in enumerate(limits):
+            label = f"limit{rest}" if len(rests) > 1 else "limit"
+            is_first = rest not in [other for other, _ in limits[:number]]
+            how: Any = {"linewidth": 1.0, "label": label if is_first else None}
+            look = _LIMITS[rests.index(rest) % len(_LIMITS)]
+            axes.plot(*zip(*places, strict=True), look, color=figures.LIMIT, **how)
         figures.tidy(axes, "", STATISTICS[statistic].meaning.replace(", ", ",\n"))
     panels[0].fill_between([], [], color=figures.SHADE, label="all criteria hold")
-    if any(_limits(study, criterion) for _, criterion in _PANELS):
-        panels[0].plot([], [], "--", color=figures.LIMIT, linewidth=1.0, label="limit")
-    figures.legend_above(panels[0], columns=min(len(names) * len(looks) + 2, 4))
+    for axes in panels:
+        if axes.get_legend_handles_labels()[0]:
+            figures.legend_above(axes, columns=4)
     panels[-1].set_xlabel("train speed [km/h]")
     return figure
 
 
-def _limits(study: SpeedStudy, criterion: str) -> list[list[tuple[float, float]]]:
-    """Speed and limit [km/h], the criterion's unit, of each criterion whose name begins so."""
+def _limits(
+    study: SpeedStudy, criterion: str, pantographs: Sequence[str]
+) -> list[tuple[str, list[tuple[float, float]]]]:
+    """Of each criterion whose name begins so the rest of its name without the pantograph, and speed
+    and limit [km/h], the criterion's unit."""
     limits: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for one in study.ended:
         way = one.variant.direction
@@ -413,4 +427,10 @@ def _limits(study: SpeedStudy, criterion: str) -> list[list[tuple[float, float]]
             if row["criterion"].startswith(criterion) and row["limit"] is not None:
                 place = (float(one.variant.varied[KEY]), float(row["limit"]))
                 limits.setdefault((way, row["criterion"]), []).append(place)
-    return list(limits.values())
+    found = []
+    for (_, name), places in limits.items():
+        rest = name.removeprefix(criterion)
+        for pantograph in pantographs:
+            rest = rest.removesuffix(f", {pantograph}")
+        found.append((rest, places))
+    return found

@@ -30,6 +30,7 @@ from catenary.cases.studies.sweep.jobs import Ended, statistics_of
 from catenary.cases.studies.sweep.output import failed_criteria
 from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import Variant, text_of
+from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import (
     Column,
@@ -291,7 +292,8 @@ def as_text(study: SeparationStudy, period: Period) -> str:
     remarks = remark_lines((f"{row[DISTANCE]:g} m", row["remarks"]) for row in study.pairs)
     lines += remarks[:_MOST_REMARKS]
     if len(remarks) > _MOST_REMARKS:
-        lines.append(f"{len(remarks) - _MOST_REMARKS} more remarks; {RECORD} has all of them.")
+        more = counted(len(remarks) - _MOST_REMARKS, "remark")
+        lines.append(f"{more} more; {RECORD} has all of them.")
     return "\n".join(lines)
 
 
@@ -370,8 +372,7 @@ def draw(study: SeparationStudy, period: Period) -> Figure | None:
         for number, name in enumerate(names):
             y = np.array([row[name] for row in done], dtype=float)
             of = PLACES[number] if len(names) > 1 else "both"
-            # The second one is dashed, for print in black.
-            look = ".--" if number else ".-"
+            look = f".{figures.line(number)}"
             figures.curve(axes, x, y, number if len(names) > 1 else 2, of, look)
         if (alone := study.rows[0][names[0]]) is not None:
             axes.axhline(alone, color=figures.GREY, linestyle=":", label="one alone")

@@ -170,14 +170,17 @@ def _by_place(
     """
     rows = []
     for i, j in _pairs(first.x, second.x):
-        row: dict[str, Any] = {"x_m": float(first.x[i]), "evaluated": bool(first.evaluated[i])}
+        inside = bool(first.evaluated[i])
+        row: dict[str, Any] = {"x_m": float(first.x[i]), "evaluated": inside}
+        row["stretch"] = "evaluated" if inside else ""
         for column, (own, other) in of_each:
             row |= _figures(column.name, own[i], other[j])
         rows.append(row)
     columns = [Column("x_m", f"{head} at [m]", ".1f")]
     for column, _ in of_each:
         columns += _columns(column.name, column.head, column.format)
-    return StudyTable([*columns, Column("evaluated", "evaluated")], rows, title)
+    columns += [Column("evaluated"), Column("stretch", "stretch", in_files=False)]
+    return StudyTable(columns, rows, title)
 
 
 def _pairs(first: np.ndarray, second: np.ndarray) -> list[tuple[int, int]]:

@@ -47,8 +47,8 @@ class RestSensitivity:
     left_out: dict[str, str] = field(default_factory=dict)
 
     @property
-    def by_unevenness(self) -> np.ndarray:
-        """Derivatives (m,) of the unevenness (max - min) / (max + min) of the elasticity."""
+    def by_non_uniformity(self) -> np.ndarray:
+        """Derivatives (m,) of the non-uniformity (max - min) / (max + min) of the elasticity."""
         low, high = self.elasticity.argmin(), self.elasticity.argmax()
         least, most = self.elasticity[low], self.elasticity[high]
         by_least, by_most = self.by_elasticity[:, low], self.by_elasticity[:, high]
@@ -175,7 +175,7 @@ def summary(found: RestSensitivity) -> StudyTable:
         Column("height", "height [mm]", "+.3f"),
         Column("at", "at [m]", ".1f"),
         Column("mean", "mean elasticity [%]", "+.4f"),
-        Column("unevenness", "unevenness [%]", "+.4f"),
+        Column("non_uniformity", "non-uniformity [%]", "+.4f"),
     ]
     rows = []
     for m, parameter in enumerate(found.parameters):
@@ -194,7 +194,7 @@ def summary(found: RestSensitivity) -> StudyTable:
                 "mean": 100.0
                 * change
                 * float(found.by_elasticity[m].sum() / found.elasticity.sum()),
-                "unevenness": 100.0 * change * float(found.by_unevenness[m]),
+                "non_uniformity": 100.0 * change * float(found.by_non_uniformity[m]),
             }
         )
     return StudyTable(columns, sorted(rows, key=lambda row: -abs(row["height"])))

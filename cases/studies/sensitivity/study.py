@@ -14,6 +14,7 @@ from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
 from catenary.cases.terminal.runs_bar import RunsBar
+from catenary.postproc.channels.places_on_train import places_on_train
 from catenary.postproc.evaluate import derivatives, filters
 from catenary.postproc.evaluate.derivatives import ForceDerivatives
 from catenary.postproc.evaluate.statistics import covers
@@ -171,8 +172,7 @@ def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
         figures = ("mean", "std", "max", "min")
         statistics.append({name: float(getattr(force, name)()) for name in figures})
     n = len(statistics)
-    middle = [f"no. {place}" for place in range(2, n)]
-    names = ["pantograph"] if n == 1 else ["leading", *middle, "trailing"]
+    names = places_on_train(n)
     order = np.argsort([place.behind for place in at_rest.problem.train.placements], kind="stable")
     return Sensitivity(
         [names[int(place)] for place in np.argsort(order)],

@@ -349,6 +349,8 @@ def in_ms(dt: float) -> str:
     return f"{1e3 * dt:.3g}" if np.isfinite(dt) else "no limit below 25"
 
 
+# Dashes and marks tell couplings apart, widths what is fixed on a curve, without colours too [pt].
+_WIDTHS = (0.7, 1.3, 2.1)
 _MARKERS = {"explicit": "o", "iterated": "s", "fixed_point": "^"}
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
@@ -378,7 +380,8 @@ def draw(found: StabilityMap) -> Figure:
     word = "implicit: stable everywhere on this map" if everywhere else "implicit: see the table"
     right.text(0.97, 0.97, word, transform=right.transAxes, ha="right", va="top", **small)
     lines = [
-        Line2D([], [], color=figures.colour(i), label=name) for i, (name, _) in enumerate(by_mass)
+        Line2D([], [], color=figures.colour(i), lw=_WIDTHS[i % len(_WIDTHS)], label=name)
+        for i, (name, _) in enumerate(by_mass)
     ]
     left.legend(handles=lines, loc="upper right", frameon=False, **small)
     word = "a coupling is stable below its line;\nabove both lines only the implicit one is"
@@ -406,7 +409,7 @@ def _panel(
     axes.yaxis.set_major_formatter("{x:g}")
     lowest: tuple[np.ndarray, np.ndarray] | None = None
     for number, (label, fixed) in enumerate(curves):
-        colour = figures.colour(number)
+        colour, width = figures.colour(number), _WIDTHS[number % len(_WIDTHS)]
         for name, marker in _MARKERS.items():
             limits = sorted(found.of(name, **fixed), key=lambda one: float(getattr(one, along)))
             x = np.array([getattr(one, along) for one in limits])
@@ -417,7 +420,7 @@ def _panel(
             if name == "fixed_point":  # the line of iterated
                 continue
             explicit = name == "explicit"
-            axes.plot(x, theory, "-" if explicit else "--", color=colour, linewidth=1.2)
+            axes.plot(x, theory, "-" if explicit else "--", color=colour, linewidth=width)
             if explicit and named:
                 end = x[-1], theory[-1]
                 axes.annotate(label, end, (-4, -13), textcoords="offset points", ha="right",

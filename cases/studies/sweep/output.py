@@ -58,7 +58,7 @@ def table_of(ended: Sequence[Ended]) -> StudyTable:
         rules = [*one.summary.get("acceptance", []), *unjudged]
         head["rules"] = list(dict.fromkeys(row["book"] for row in rules if row.get("book")))
         verdict = "passed" if head["passed"] else "not judged"
-        head["accepted"] = f"FAILED {', '.join(failed)}" if failed else verdict
+        head["accepted"] = f"FAILED {'; '.join(failed)}" if failed else verdict
         head["wall_s"] = one.wall
         rows += [head | figures for figures in statistics_of(one.summary)]
     columns = [
@@ -191,7 +191,8 @@ def draw(table: Sequence[Mapping[str, Any]], keys: Sequence[str], plotted: Seque
             x = [float(row[axis]) if key else places.index(cell(row[axis])) for row in own]
             y = [np.nan if row[name] is None else float(row[name]) for row in own]
             order = np.argsort(x, kind="stable")
-            figures.curve(axes, np.array(x)[order], np.array(y)[order], number, label, "o-")
+            look = figures.mark(number) + figures.line(number)
+            figures.curve(axes, np.array(x)[order], np.array(y)[order], number, label, look)
         figures.tidy(axes, "", figures.wrapped(STATISTICS[name].meaning))
     if len(curves) <= _MOST_LABELS:
         figures.legend_above(panels[0], columns=min(len(curves), 3))

@@ -90,7 +90,9 @@ def _draw_share(
     known, whole = fewest == most, samples.n_run == n
     # Of all criteria a curve that leaves those below it to be seen.
     look, number = (
-        (":", figures.COLOURS.index("#000000")) if one.criterion == EACH else ("-", number)
+        (":", figures.COLOURS.index("#000000"))
+        if one.criterion == EACH
+        else (figures.LINES[number % 3], number)  # none of these is dotted
     )
     x, share = samples.levels + beside, 100.0 * most / n
     figures.curve(axes, x[known], share[known], number, one.criterion, look, 1.5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -27,7 +28,7 @@ from catenary.cases.studies.uncertainty.run_table import RunTable, run_table, sa
 from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
 from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import Column, Content, StudyTable, write_files
+from catenary.postproc.report.study_table import Column, Content, StudyTable, alike, write_files
 
 # Panels, points and lines that a picture has room for.
 _MOST_KEYS, _MOST_STATISTICS, _MOST_POINTS, _MOST_LINES = 6, 5, 5000, 1000
@@ -92,7 +93,7 @@ def scatter(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
             for number, (pantograph, rows) in enumerate(table.of(name).items()):
                 some = _some(rows, _MOST_POINTS)
                 figures.curve(
-                    axes, some[key], some[name], number, pantograph or None, "o",
+                    axes, some[key], some[name], number, pantograph or None, figures.mark(number),
                     ms=4.0 if len(some) < _MANY else 1.5, alpha=0.6, mew=0.0,
                 )  # fmt: skip
             _panel(axes, "", _meaning(name) if key == keys[0] else "")
@@ -174,9 +175,10 @@ def convergence(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
         means = np.array([student(x[:n]) for n in counts])
         adverse = np.array([quantile(x[:n], adverse_probability(name)) for n in counts])
         for number, (label, found) in enumerate((("mean", means), (_ADVERSE, adverse))):
-            figures.curve(axes, counts, found[:, 0], number, label, ".-")
+            mark = figures.mark(number)
+            figures.curve(axes, counts, found[:, 0], number, label, f"{mark}-")
             for bound in (found[:, 1], found[:, 2]):
-                figures.curve(axes, counts, bound, number, None, "--", 0.7)
+                figures.curve(axes, counts, bound, number, None, f"{mark}--", 0.7, ms=2.0)
         several = len(table.of(name)) > 1
         _panel(axes, "", _meaning(name), f"{worst[name][0]}, the worst one" if several else "")
     panels[-1].set_xlabel("number of samples; dashed: 95 % confidence", fontsize="small")
@@ -203,7 +205,9 @@ def histograms(table: RunTable, wanted: Sequence[str] = ()) -> Figure | None:
             # The bins of Freedman and Diaconis, but no more than are seen.
             bins = min(60, len(np.histogram_bin_edges(x, "fd")))
             colour = figures.colour(number)
-            axes.hist(x, bins, color=colour, alpha=0.5, edgecolor="white", label=pantograph or None)
+            bars: dict[str, Any] = {"color": colour, "alpha": 0.5, "edgecolor": "white"}
+            bars |= {"hatch": figures.hatch(number), "label": pantograph or None}
+            axes.hist(x, bins, **bars)
             for probability, look in ((0.5, "-"), (adverse_probability(name), "--")):
                 axes.axvline(float(np.quantile(x, probability)), color=colour, ls=look, lw=1.2)
         _panel(axes, _meaning(name), "runs")
@@ -280,8 +284,12 @@ def as_text(found: Uncertainty) -> str:
     shown = [r for r in found.sensitivity if "with" not in r and r["statistic"] not in hidden]
     if shown:
         parts.append(capital(found.method) + "\n" + _indices(shown).text())
-    remarks = found.remarks[:_MOST_REMARKS]
-    lines = [f"REMARK      {one['n']} of {found.n_runs} runs: {one['remark']}" for one in remarks]
+    n_of = {one["remark"]: one["n"] for one in found.remarks}
+    lines = []
+    for texts in alike(n_of)[:_MOST_REMARKS]:
+        numbers = ", with different numbers, such as" if len(texts) > 1 else ""
+        n = sum(n_of[text] for text in texts)
+        lines.append(f"REMARK      {n} of {found.n_runs} runs{numbers}: {texts[0]}")
     lines += [f"NOTE        {note}" for note in found.notes]
     return "\n\n".join([*parts, *(["\n".join(lines)] if lines else [])])
 

@@ -35,6 +35,9 @@ logger = logging.getLogger("catenary.pictures")
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#000000")
 GREY, LIGHT, SHADE, LIMIT = "#6b6b6b", "#c9c9c9", "#e1e8f2", "#b3261e"
 RUN_IN, WORST = "#fff4cc", "#fbd9b5"
+# Lines, marks and hatches of a panel, which a print without colours tells apart: the first colours
+# are nearly the same grey.
+LINES, MARKS, HATCHES = ("-", "--", "-.", ":"), ("o", "s", "^", "D"), ("", "//", "..", "xx")
 WIDTH = 9.0
 _RESOLUTION = 130
 # Room around panels whose layout is not computed [inch]: tick labels of six characters and a
@@ -156,6 +159,21 @@ def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, lis
 def colour(pantograph: int) -> str:
     """Colour of a pantograph, the same in all pictures."""
     return COLOURS[pantograph % len(COLOURS)]
+
+
+def line(number: int) -> str:
+    """Line of a curve in a panel of several."""
+    return LINES[number % len(LINES)]
+
+
+def mark(number: int) -> str:
+    """Mark of a curve in a panel of several."""
+    return MARKS[number % len(MARKS)]
+
+
+def hatch(number: int) -> str:
+    """Hatching of bars in a panel of several."""
+    return HATCHES[number % len(HATCHES)]
 
 
 def curve(

@@ -23,7 +23,9 @@ from catenary.postproc.report.pictures.figures import (
     RUN_IN,
     colour,
     curve,
+    hatch,
     legend_above,
+    line,
     own_style,
     stacked,
     tidy,
@@ -35,8 +37,6 @@ from catenary.postproc.report.pictures.marks import (
     travelled,
 )
 
-# Of bars, which a print without colours tells apart.
-_HATCHES = ("", "//", "..", "xx")
 # Frequencies that a spectrum shows [Hz], and fewest records of one.
 _HIGHEST, _FEWEST = 60.0, 64
 
@@ -109,7 +109,7 @@ def force_spectrum(results: Results, lengths: Mapping[str, float]) -> Figure:
         stretch = min(force.size, max(wanted, _FEWEST))
         frequency, power = signal.welch(force, 1.0 / results.dt, nperseg=stretch, detrend="linear")
         shown = (frequency > 0.0) & (frequency <= _HIGHEST)
-        curve(axes, frequency[shown], power[shown], p, name, _look(p), 1.3)
+        curve(axes, frequency[shown], power[shown], p, name, line(p), 1.3)
     for (word, length), style in zip(lengths.items(), ("--", ":"), strict=False):
         first = speed / length
         label = f"{word} passing, {first:.2f} Hz and multiples"
@@ -124,11 +124,6 @@ def force_spectrum(results: Results, lengths: Mapping[str, float]) -> Figure:
     tidy(axes, "frequency [Hz]", "spectral density [N²/Hz]")
     legend_above(axes)
     return figure
-
-
-def _look(pantograph: int) -> str:
-    """Line of a pantograph in a panel of several, which a print without colours tells apart."""
-    return ("-", "--", "-.", ":")[pantograph % 4]
 
 
 @own_style()
@@ -154,7 +149,7 @@ def contact_height(
         mark_line(axes, results, start, end, named=axes is height)
         for p, (name, own) in enumerate(heights.items()):
             chosen = thinned(own[number])
-            curve(axes, own[0][chosen], factor * own[number][chosen], p, name, _look(p))
+            curve(axes, own[0][chosen], factor * own[number][chosen], p, name, line(p))
         tidy(axes, "", label)
         legend_above(axes)
     gradient.set_xlabel("position of the pantograph along the track [m]")
@@ -203,7 +198,7 @@ def force_statistics(statistics: RunStatistics) -> Figure:
     for place, (index, pantograph) in enumerate(shown):
         at = np.arange(len(groups)) + (place - 0.5 * (len(shown) - 1)) * width
         values = np.array([getattr(pantograph, name) for name in groups])
-        look: dict[str, Any] = {"color": colour(index), "hatch": _HATCHES[index % 4]}
+        look: dict[str, Any] = {"color": colour(index), "hatch": hatch(index)}
         bars = axes.bar(at, values, 0.92 * width, label=pantograph.name, **look)
         labels_of_bars = [f"{round(value)}" for value in values]
         axes.bar_label(bars, labels_of_bars, padding=2, fontsize=8 if len(shown) < 4 else 6)
@@ -226,7 +221,7 @@ def force_histogram(statistics: RunStatistics) -> Figure:
         bin_width = edges[1] - edges[0]
         width = 0.86 * bin_width / len(shown)
         left = edges[:-1] + 0.07 * bin_width + place * width
-        look: dict[str, Any] = {"color": colour(index), "hatch": _HATCHES[index % 4]}
+        look: dict[str, Any] = {"color": colour(index), "hatch": hatch(index)}
         axes.bar(left, percent, width, align="edge", label=pantograph.name, **look)
     axes.xaxis.set_major_locator(MaxNLocator(12, steps=[1, 2, 2.5, 5, 10]))
     widths = sorted({f"{np.diff(p.histogram_edges[:2])[0]:g}" for _, p in shown}, key=float)

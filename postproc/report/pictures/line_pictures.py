@@ -122,6 +122,10 @@ def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> N
             linewidth=1.6,
             label=f"largest uplift, arm at {supports.x[worst]:.1f} m",
         )
+    # As far as a curve reaches: the record of a short run ends soon after the last arm.
+    known = np.concatenate([behind, *(line.get_xdata() for line in axes.lines)])
+    if excited is None and axes.lines:
+        before, after = max(before, float(known.min())), min(after, float(known.max()))
     for p, name in enumerate(names):
         axes.axvline(
             behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=f"{name} passes"

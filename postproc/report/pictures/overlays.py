@@ -14,8 +14,8 @@ from catenary.postproc.report.pictures.envelope import thinned
 _PLACE = "position along the track [m]"
 # Label, places along the track (n,) [m], and values (n,) there.
 Curve = tuple[str, np.ndarray, np.ndarray]
-# Curves and marks of a panel, told apart in black and white too.
-_LINES, _MARKS = ("-", "--", ":", "-."), ("o", "x", "^", "s")
+# Marks of a panel: those of equal values let each other be seen.
+_MARKS = ("o", "x", "^", "s")
 
 
 @figures.own_style()
@@ -42,7 +42,7 @@ def forces(
     for own, (name, curves) in zip(axes, panels, strict=True):
         for number, (label, place, force) in enumerate(curves):
             chosen = thinned(force)
-            look = _LINES[number % len(_LINES)]
+            look = figures.line(number)
             figures.curve(own, place[chosen], force[chosen], number, label, look)
         _shade(own, evaluated)
         force_of = f"contact force, {below} [N]" if below else "contact force [N]"

@@ -71,9 +71,12 @@ def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
     if elasticity.size:
         low, high = elasticity.min(), elasticity.max()
         start, end = results.static("elasticity_x")[[0, -1]]
+        lifted = int(np.isfinite(results.static("elasticity_of_wires")).any(axis=0).sum())
+        together = ", of all contact wires together" if lifted > 1 else ""
+        outside = " and outside of overlaps" if len(results.contact_profiles()) > lifted else ""
         yield Text(
-            f"Elasticity in span {span}, {start:.6g} to {end:.6g} m, near the middle of the line "
-            f"and outside of overlaps: {low:#.3g} to {high:#.3g} mm/N (non-uniformity "
+            f"Elasticity in span {span}, {start:.6g} to {end:.6g} m, near the middle of the line"
+            f"{outside}{together}: {low:#.3g} to {high:#.3g} mm/N (non-uniformity "
             f"{number(100 * (high - low) / (high + low))} %)."
         )
     own = [row for row in csv_tables.dropper_table(results) if row.span == span]

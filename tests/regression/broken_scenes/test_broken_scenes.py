@@ -226,7 +226,7 @@ ASSIGNMENTS = {
             "train.start_m=300",
             "train.end_m=900",
         ],
-        "pantograph 2 only runs from 100 to 700 m",
+        "the trailing pantograph only runs from 100 to 700 m",
     ),
     "several pantographs switched off": (
         [

@@ -623,6 +623,24 @@ def test_from_behind_droppers_beyond_what_is_seen_are_not_drawn(folder: Path) ->
     np.testing.assert_array_equal(drawn, seen)
 
 
+def test_from_behind_pantographs_behind_the_eye_are_not_drawn(
+    recorded: Callable[..., Path],
+) -> None:
+    """The eye goes with the camera's pantograph; one 40 m behind would fill the picture."""
+    place = recorded(50, 0.0, 40.0)
+    drawn = {}
+    for camera in (None, "leading", "trailing"):
+        with pictures_of(place, FilmOptions(camera=camera, view=View.ALONG)) as made:
+            made.show(0.5)
+            numbers = made._scenery.parts[PANTOGRAPHS].fields["number"]
+            shown = [one.size > 0 for one in made.drawing.bodies.get_segments()]
+            drawn[camera] = {int(p) for p, there in zip(numbers, shown, strict=True) if there}
+            assert [text.get_visible() for text in made.drawing.values] == [
+                p in drawn[camera] for p in (0, 1)
+            ]
+    assert drawn == {None: {0}, "leading": {0}, "trailing": {0, 1}}
+
+
 def test_droppers_that_are_missing_or_broke_are_not_drawn(folder: Path) -> None:
     # The fourth snapshot is that of 0.15 s.
     defects = [{"type": "missing_dropper", "at_m": 60.0, "wire": "contact_wire", "says": "missing"}]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 import types
 from collections.abc import Iterator
 from typing import Any
@@ -121,8 +122,27 @@ def test_a_terminal_shows_phases_and_a_bar(log: list[str]) -> None:
         clock.now += 5.0
     assert screen.getvalue().endswith("\r\x1b[K")
     march(progress, clock, 2000, 1e-3)
-    assert "2.00/2.00 s simulated" in screen.getvalue() and "x real time" in screen.getvalue()
+    assert "/2.00 s simulated" in screen.getvalue()
+    assert screen.getvalue().endswith("\r")  # the bar goes
     assert not log
+
+
+def test_a_slow_first_step_foretells_nothing(log: list[str]) -> None:
+    """It prepares what later steps use; a thousandth of the march in a second is no hour."""
+    clock, screen = Clock(), Terminal()
+    progress = Progress(RANK_0, screen, clock)
+    progress.start(stage(4000))
+    bar = progress._bar
+    bar._time = lambda: clock.now
+    bar.start_t = bar.last_print_t = clock.now
+    view: Any = types.SimpleNamespace(step=0, time=0.0)
+    for step in range(1, 1000):
+        clock.now += 1.0 if step == 1 else 1e-3
+        view.step, view.time = step, step * DT
+        progress.observe(view)
+    progress.finish("stopped")
+    told = set(re.findall(r"x real time, left ([0-9:]+)", screen.getvalue()))
+    assert told and max(told) <= "00:04"
 
 
 @pytest.mark.parametrize(("rank", "quiet"), [(0, True), (1, False)])

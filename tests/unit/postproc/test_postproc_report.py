@@ -22,7 +22,7 @@ from catenary.postproc.read.results import Results
 from catenary.postproc.report.page import page, pdf
 from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
-from catenary.postproc.report.sections.section import Section
+from catenary.postproc.report.sections.section import Section, Text
 from catenary.postproc.report.study_table import texts_table
 
 TEMPLATES = Path(catenary.postproc.report.page.__file__).parent / "templates"
@@ -164,6 +164,18 @@ def test_a_wide_table_ends_within_the_margins_of_its_sheet() -> None:
     (sheet,) = pypdf.PdfReader(io.BytesIO(pdf(html))).pages
     sheet.extract_text(visitor_operand_before=lambda *found: places.append(found[3][4]))
     assert 600.0 < max(places) < 737.0
+
+
+def test_no_line_ends_within_a_unit() -> None:
+    """Of a cell or a sentence; what is to be copied stays as it is."""
+    cells = [["vertical stiffness 182 N/m, 45 % of it, 3 of 4"], ["run `catenary judge` 9 % or so"]]
+    table = texts_table(["data"], cells)
+    text = Text("Elasticity 0.42 mm/N; `catenary worst --at 100 m`.")
+    html = page("title", "By 7.8 % [mm/N].", [Section("Wires", [text, table])], {})
+    assert "By 7.8\u00a0% [mm/\u2060N]." in html
+    assert "stiffness 182\u00a0N/\u2060m, 45\u00a0% of it, 3 of 4" in html
+    assert "run <code>catenary judge</code> 9\u00a0% or so" in html
+    assert "Elasticity 0.42\u00a0mm/\u2060N; <code>catenary worst --at 100 m</code>." in html
 
 
 def test_report_says_what_was_found(report_folder: Path, march: Any) -> None:
