@@ -210,8 +210,8 @@ def test_what_is_no_range_is_refused(words: list[str], told: str) -> None:
 def test_limits_of_a_panel_are_told_apart() -> None:
     """Two of the deviation by name and dashes, which a print without colours shows."""
     draft = read_draft(CASE, ("train.end_m=400", "evaluation.from_m=300", "evaluation.to_m=390"))
-    marching = Marching(draft, None, MPI.COMM_SELF, AS_USUAL)
-    figure = draw(find_speeds(marching, draft.scene(), Speeds(250, 260, 10, 10), ()))
+    marching = Marching(draft, draft.scene(), None, MPI.COMM_SELF, AS_USUAL)
+    figure = draw(find_speeds(marching, Speeds(250, 260, 10, 10), ()))
     assert figure is not None
     deviation, *others = (
         {line.get_label(): line.get_linestyle() for line in axes.lines} for axes in figure.axes
