@@ -123,7 +123,9 @@ class Simulation:
         InputError
             If it is no number of steps.
         RunBroken
-            If the forces of a step cannot be found, or if the end had come before this call.
+            If the forces of a step cannot be found, if a wire has turned from rest by more than a
+            linear line bears, or if the end had come before this call. Only ``restore`` goes on
+            then, from an earlier state.
 
         Examples
         --------
@@ -144,7 +146,10 @@ class Simulation:
         try:
             done = self._own.step(min(steps, self.steps_left + 1))
         except RuntimeError as error:
-            raise RunBroken(f"{error} after {self.time:g} s") from error
+            raise RunBroken(
+                f"{error} after {self.time:g} s: restore() an earlier state, and look at what was "
+                "added to forces and bases"
+            ) from error
         self._ended = not done
         return done
 
@@ -175,7 +180,7 @@ class Simulation:
         Raises
         ------
         InputError
-            If it is no state of this line.
+            If it is no state of this line, or damaged.
 
         Examples
         --------

@@ -25,7 +25,10 @@ class Bound:
 # Records: named tuples of the members of structs in C++, whose headers say what each of them is.
 Across = namedtuple("Across", "place, rate, moved")
 Affine = namedtuple("Affine", "place, rate, by_force, rate_by_force")
-Ahead = namedtuple("Ahead", "dt, n_done, drives, ties, one_speed, longest_way")
+Ahead = namedtuple(
+    "Ahead",
+    "dt, n_done, drives, ties, one_speed, longest_way, turns, most_turn, look_steps",
+)
 Alpha = namedtuple(
     "Alpha",
     "dt, ratio, known_of_balanced, known_of_own, position_of_own, position_of_known, "
@@ -466,7 +469,8 @@ class Simulation:
         Raises
         ------
         RuntimeError
-            If the forces of a step could not be found: nothing can be stepped further.
+            If the forces of a step could not be found, or if a wire has turned by more than a
+            linear line bears: no further step is taken until an earlier state is restored.
         """
 
     def set_speed(self, speed: float) -> bool:
@@ -477,7 +481,7 @@ class Simulation:
         """The state, to come back to."""
 
     def restore(self, state: bytes) -> None:
-        """Go back to a state of this line."""
+        """Go back to a state of this line; ValueError if it is none, or damaged."""
 
     @property
     def inputs(self) -> np.ndarray:

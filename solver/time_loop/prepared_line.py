@@ -17,14 +17,20 @@ from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.kernels import native
+from catenary.solver.model.beam import MOST_ROTATION
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
 
 # Links of a long line that may switch in one step: mostly it is some ten. These take 7 MB.
 _MOST_LINKS = 512
 
+# Time in which all rotations of wires are looked at once [s], as a run does.
+_LOOKS = 1.0
 
-def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, int]) -> None:
+
+def write_line(
+    path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, int], turns: np.ndarray
+) -> None:
     """Write a line as it is now, with what steps to come depend on. Not collective.
 
     Parameters
@@ -37,6 +43,8 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
         Time step [s].
     steps : tuple of int
         Numbers of the latest step and of the last one to come.
+    turns : ndarray
+        Unknowns of rotation of all wires.
 
     Raises
     ------
@@ -70,6 +78,9 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
         ties=np.array([model.tie for model in models], dtype=native.TIE),
         one_speed=pantographs.along_track or bool(drives[..., N_DRIVE:].any()),
         longest_way=end - float(pantographs.places_along.start.max()),
+        turns=turns.astype(np.int64),
+        most_turn=MOST_ROTATION,
+        look_steps=max(1, round(_LOOKS / dt)),
     )
     pantographs.move_to(first * dt)
     try:
