@@ -222,6 +222,15 @@ def test_samples_are_half_a_period_of_the_filter_apart() -> None:
     assert by_time.place == pytest.approx(found.place)
 
 
+@pytest.mark.parametrize(("is_filtered", "filter_hz"), [(False, 62.5), (True, 124.0)])
+def test_the_fewest_samples_of_a_filter_have_noise_of_full_rank(
+    is_filtered: bool, filter_hz: float
+) -> None:
+    found = measurement(samples(), is_filtered=is_filtered, filter_Hz=filter_hz)
+    (signal,) = found.signals
+    assert np.isfinite(signal.whitening.of(signal.values)).all()
+
+
 def test_units_of_columns_are_converted() -> None:
     table = samples()
     table["kN"], table["km"] = table.F / 1e3, table.x / 1e3
@@ -342,7 +351,8 @@ def test_separators_at_the_end_of_lines_make_no_column(tmp_path: Path) -> None:
     [
         ({"force": {"column": "Q", "noise": 1.0}}, 'm.csv has no column "Q": it has x, t, F'),
         ({"from_m": 290.0, "to_m": 300.0}, "reaches from 100.0 to 300.0 m .* takes 20 to 8000"),
-        ({"is_filtered": False, "filter_Hz": 200.0}, "has 250 samples .* takes more than 400"),
+        ({"is_filtered": False, "filter_Hz": 200.0}, "has 250 samples .* takes at least 800 of v"),
+        ({"is_filtered": False, "filter_Hz": 63.0}, "takes at least 252 of values that are not fi"),
         ({"is_filtered": True, "filter_Hz": 200.0}, "has 250 samples .* takes more than 400"),
     ],
 )
