@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 from pathlib import Path
 
 import numpy as np
@@ -83,10 +85,20 @@ def write_line(
         look_steps=max(1, round(_LOOKS / dt)),
     )
     pantographs.move_to(first * dt)
+    # An earlier file stays until this one is whole. A device takes what is written as it comes.
+    made_as = path
+    if path.is_file() or not path.exists():
+        made_as = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        blocks.steps().write(str(path), ahead)
-    except RuntimeError as error:
+        blocks.steps().write(str(made_as), ahead)
+        if made_as != path:
+            made_as.replace(path)
+    except (OSError, RuntimeError) as error:
         raise RunBroken(f"{path}: {error}: free some space or choose another file") from error
+    finally:
+        if made_as != path:
+            with contextlib.suppress(OSError):
+                made_as.unlink(missing_ok=True)
 
 
 def make_room(scheme: OneSolve) -> None:
