@@ -14,6 +14,7 @@ import threading
 import time
 import weakref
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -476,6 +477,17 @@ def test_values_of_all_kinds_reach_their_scenes() -> None:
 
 
 # --- pictures -----------------------------------------------------------------------------------
+
+
+def test_threads_read_one_run_side_by_side(in_memory: catenary.Run) -> None:
+    names = ("arm_uplift", "dropper_force", "contact_force", "head_height") * 4
+
+    def sums(_: int) -> list[float]:
+        return [float(in_memory.channel(name).sum()) for name in names]
+
+    expected = sums(0)
+    with ThreadPoolExecutor(8) as pool:
+        assert all(found == expected for found in pool.map(sums, range(40)))
 
 
 def test_pictures_are_those_of_the_report(in_memory: catenary.Run) -> None:
