@@ -404,6 +404,8 @@ SOUGHT = [{"key": FORCE, "deviation": 4.0}]
         ({"measured": MEASURED, "droppers": {"spans": [], "deviation_mm": 2.0}}, "droppers.spans"),
         ({"measured": MEASURED, "droppers": {"spans": [5, 5], "deviation_mm": 2.0}},
          "must name each span once"),
+        ({"measured": {**MEASURED, "filter_Hz": 1e-308}, "parameters": SOUGHT},
+         "measured.filter_Hz is 1e-308 in t.toml; it must be at least 0.001"),
         ({"measured": {**MEASURED, "from_m": 300.0, "to_m": 200.0}, "parameters": SOUGHT},
          "must have to_m greater than from_m, but they are 200 and 300"),
         ({"measured": {**MEASURED, "force": {"column": "F", "noise": 1.0, "unit": "kg"}},
