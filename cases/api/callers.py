@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import operator
 import os
@@ -27,7 +28,7 @@ def communicator(comm: Any) -> Any:
     Raises InputError if it is none.
     """
     if comm is not None:
-        if not hasattr(comm, "rank"):
+        if not isinstance(getattr(comm, "rank", None), int):
             raise InputError(f"comm is {shown(comm)}; it must be a communicator of mpi4py")
         return comm
     return world() if launched_by_mpirun() else alone()
@@ -130,10 +131,21 @@ def path_of(path: Any, argument: str, wanted: str = "a path") -> Path:
     """
     if isinstance(path, str | os.PathLike):
         text = os.fspath(path)
-        if isinstance(text, str) and text and "\0" not in text:
-            with suppress(RuntimeError):  # a user whom nobody knows
-                return Path(text).expanduser()
+        if isinstance(text, str) and text:
+            with suppress(RuntimeError, ValueError):  # a user whom nobody knows; null bytes, halves
+                found = Path(text).expanduser()
+                if _can_be(found):
+                    return found
     raise InputError(f"{argument} is {shown(path)}; it must be {wanted}")
+
+
+def _can_be(path: Path) -> bool:
+    """Whether a file may have this name, be it there or not; ValueError if no file ever has."""
+    try:
+        path.lstat()
+    except OSError as error:
+        return error.errno != errno.ENAMETOOLONG
+    return True
 
 
 def folder_of(out: Any) -> Path | None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.faults import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,9 +75,9 @@ class Pictures:
         from catenary.postproc.report.pictures.figures import fitted
 
         for own, _, draw in self._drawings():
-            if own == name and (figure := draw()) is not None:
+            if isinstance(name, str) and own == name and (figure := draw()) is not None:
                 return fitted(figure)
-        raise InputError(f"the run has no picture {name}; it has {', '.join(self.names)}")
+        raise InputError(f"the run has no picture {shown(name)}; it has {', '.join(self.names)}")
 
     def force(self) -> Figure:
         """Contact force of each pantograph along the track, unfiltered and below 20 Hz [N].

@@ -14,6 +14,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
 from catenary.callers import path_of
+from catenary.cases.scene.input.faults import shown
 from catenary.pictures import Pictures
 from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.read.results import Results
@@ -289,9 +290,9 @@ class Run:
         """
         import xarray as xr
 
-        if name not in self.channels:
+        if not isinstance(name, str) or name not in self.channels:
             there = ", ".join(self.channels)
-            raise InputError(f"the run has no record {name}; it has {there}")
+            raise InputError(f"the run has no record {shown(name)}; it has {there}")
         results = self._results
         kept = results.energies()
         if name in kept:

@@ -123,8 +123,9 @@ class Simulation:
         InputError
             If it is no number of steps.
         RunBroken
-            If a step cannot be taken, with what may be why, or if the end had come before this
-            call.
+            If a step cannot be taken, with what may be why, if a wire has turned from rest by more
+            than a linear line bears, or if the end had come before this call. Only ``restore`` goes
+            on then, from an earlier state.
 
         Examples
         --------
@@ -145,7 +146,8 @@ class Simulation:
         try:
             done = self._own.step(min(steps, self.steps_left + 1))
         except RuntimeError as error:
-            raise RunBroken(f"{error} after {self.time:g} s: {self._why()}") from error
+            why = f"after {self.time:g} s {error}{self._not_finite()}"
+            raise RunBroken(f"{why}; restore() an earlier state") from error
         self._ended = not done
         return done
 
@@ -176,7 +178,7 @@ class Simulation:
         Raises
         ------
         InputError
-            If it is no state of this line.
+            If it is no state of this line, or damaged.
 
         Examples
         --------
@@ -450,16 +452,13 @@ class Simulation:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.close()
 
-    def _why(self) -> str:
-        """What may have ended the steps."""
+    def _not_finite(self) -> str:
+        """A clause on inputs that are no numbers."""
         inputs = self._own.inputs
         for name in inputs.dtype.names or ():
             if not np.isfinite(inputs[name]).all():
-                return f"{name} is {inputs[name].tolist()}; it must be finite"
-        return (
-            "no contact forces fit it, a kinematic contact would have to pull, or a mechanism "
-            "would leave the heights that it can reach"
-        )
+                return f": {name} is {inputs[name].tolist()}; it must be finite"
+        return ""
 
     def _add(self, name: str, value: Any) -> None:
         try:

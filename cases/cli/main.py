@@ -81,7 +81,10 @@ def main() -> None:
     if launched_by_mpirun():
         # From here on the end of each rank waits for the others', so that a sentence of rank 0
         # is out before the launcher gets the exit code of another.
-        console.world()
+        if len(set(console.world().allgather(tuple(sys.argv[1:])))) > 1:
+            # They would wait for each other without end.
+            console.complain("the processes of mpirun have different words: give all the same")
+            sys.exit(console.BAD_INPUT)
     is_run = bool(_OF_RUN.intersection(sys.argv[1:2]))
     app = application.app if is_run else all_verbs()
     command: Any = typer.main.get_command(application.narrowed(app, sys.argv[1:]))

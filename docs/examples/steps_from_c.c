@@ -57,7 +57,7 @@ int main(int argc, char** argv) {
         const double begin = now_us();
         const int outcome = catenary_step(line, 1);
         took[k] = now_us() - begin;
-        if (outcome == CATENARY_NOT_FOUND) return 1;
+        if (outcome != CATENARY_DONE && outcome != CATENARY_AT_END) return 1;
         if (outcome == CATENARY_AT_END) {
             catenary_restore(line, start);
             continue;

@@ -69,6 +69,10 @@ class Elsewhere(OSError):
     file."""
 
 
+class Cut(OSError):
+    """Another program has made the file shorter than what was written."""
+
+
 def reserve(file: h5py.File, n_bytes: int) -> None:
     """Claim ``n_bytes`` [bytes] on the disk behind the end of an open file, whose path may name
     another file by now. Not collective.
@@ -99,7 +103,9 @@ def check_in_place(path: Path, handle: int) -> None:
                 "it is, what the run had written is lost"
             )
         what = path if path.parent.is_dir() else f"the folder {path.parent}"
-        raise Elsewhere(f"{what} was removed while the run went on; what it had written is lost")
+        raise Elsewhere(
+            f"{what} was removed while the run went on; what the run had written into it is lost"
+        )
     try:
         now = Path(os.readlink(f"/proc/self/fd/{handle}"))
     except OSError:  # not Linux
@@ -110,6 +116,18 @@ def check_in_place(path: Path, handle: int) -> None:
         f"{path} is now {now}, moved while the run went on: what was written is there, and "
         f"`catenary restart {quote(str(now.parent))}` continues the run"
     )
+
+
+def check_uncut(path: Path, handle: int, least: int) -> None:
+    """Raise ``Cut`` if the file open as ``handle`` has fewer than ``least`` bytes [bytes].
+
+    HDF5 reads what is gone as zeros, and crashes. Not collective.
+    """
+    if (size := os.fstat(handle).st_size) < least:
+        raise Cut(
+            f"another program has cut {path} to {size} bytes while the run went on; what the run "
+            "had written into it is lost"
+        )
 
 
 def _claim(handle: int, start: int, n_bytes: int) -> None:
@@ -224,7 +242,7 @@ def broken_write(path: Path, time: float, error: Exception, begun: bool = True) 
 
     ``begun`` says whether the run has results yet, in place of those of an earlier one.
     """
-    if isinstance(error, Elsewhere):
+    if isinstance(error, Elsewhere | Cut):
         return RunBroken(f"the run ended at t = {time:.3f} s because {error}")
     kept = (
         "what was written before stays readable"

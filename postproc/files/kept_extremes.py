@@ -46,7 +46,7 @@ def drop_extremes(file: h5py.File, n_rows: int) -> None:
     """Forget extremes of more steps than a run that goes on after ``n_rows`` has shown."""
     for slot in file[GROUP].values():
         if _rows_of(slot) > n_rows + 1:
-            slot[ROWS][...] = 0
+            slot[ROWS][...] = -1
 
 
 def extremes_at(file: h5py.File, n_rows: int) -> dict[str, np.ndarray] | None:

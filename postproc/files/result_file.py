@@ -29,6 +29,7 @@ from catenary.postproc.files.disk import (
     abandon,
     as_attribute,
     check_in_place,
+    check_uncut,
     open_to_write,
     reserve,
     trimmed,
@@ -193,6 +194,7 @@ class ResultFile:
         OSError, RuntimeError
             If HDF5 could not write.
         """
+        self._check_uncut()
         for name, block in blocks.items():
             dataset = self._growing[name]
             append_rows(dataset, dataset.id.shape[0], block)
@@ -220,6 +222,7 @@ class ResultFile:
 
     def conclude(self, outcome: str) -> None:
         """Store how the run ended."""
+        self._check_uncut()
         time = self._growing["time"]
         attributes = self._file.attrs
         set_attribute(self._file, "outcome", outcome)
@@ -241,6 +244,10 @@ class ResultFile:
         with trimmed(self._file):
             self._file.close()
         self._remove_if_empty()
+
+    def _check_uncut(self) -> None:
+        """Raise ``storage.Cut`` if something of what was written is gone."""
+        check_uncut(self._path, self._file.id.get_vfd_handle(), self._file.id.get_filesize())
 
     def _append_line(self, line: LineRows, blocks: Mapping[str, np.ndarray]) -> None:
         """Append rows of the line's channels; blocks that are outside of the window are left out,

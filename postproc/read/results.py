@@ -277,9 +277,10 @@ class Results(TrainOfRun):
             return None
         # The latest is kept open: HDF5 forgets the chunks of one that is closed, and would read
         # them again for the next column.
-        if self._latest is None or self._latest[0] != path:
-            self._latest = path, self._file[path]
-        return self._latest[1]
+        latest = self._latest  # another thread may ask for another table meanwhile
+        if latest is None or latest[0] != path:
+            latest = self._latest = path, self._file[path]
+        return latest[1]
 
     def _valid(self, name: str, part: slice) -> slice:
         """The rows of a part that can be read."""

@@ -29,6 +29,7 @@ import numpy as np
 from catenary.base.errors import RunBroken
 from catenary.postproc.channels.places_on_train import in_sentence, places_on_train
 from catenary.postproc.evaluate.wording import capital
+from catenary.solver.model.beam import MOST_ROTATION
 from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView
@@ -40,7 +41,7 @@ strip_logger = logging.getLogger("catenary.strips")
 REPORTED_SHARE = 0.05
 # Rotation of a wire from rest [rad], and lift of a steady arm over its length [-], above which the
 # watch reports it, and ends the march.
-REPORTED_ROTATION, MOST_ROTATION = 0.1, 1.0
+REPORTED_ROTATION = 0.1
 REPORTED_ARM, MOST_ARM = 0.5, 1.0
 _ROTATIONS = ("theta_y", "theta_z")
 # Time between two looks at energy and motion [s]. A look takes as long as twenty steps of 1 ms.

@@ -28,7 +28,10 @@ class Bound:
 # Records: named tuples of the members of structs in C++.
 Across = namedtuple("Across", "place, rate, moved")
 Affine = namedtuple("Affine", "place, rate, by_force, rate_by_force")
-Ahead = namedtuple("Ahead", "dt, n_done, drives, ties, one_speed, longest_way")
+Ahead = namedtuple(
+    "Ahead",
+    "dt, n_done, drives, ties, one_speed, longest_way, turns, most_turn, look_steps",
+)
 Alpha = namedtuple(
     "Alpha",
     "dt, ratio, known_of_balanced, known_of_own, position_of_own, position_of_known, "

@@ -346,7 +346,9 @@ class March:
         scheme, showing, dt = self.in_loop()
         blocks = compiled_steps(scheme, showing, dt, shows=False)
         assert blocks is not None
-        write_line(path, blocks, dt, (self._first_step, self.n_steps))
+        numbering = self._changed.model.numbering
+        turns = numbering.numbers[:, [name.startswith("theta") for name in numbering.names]]
+        write_line(path, blocks, dt, (self._first_step, self.n_steps), turns[turns >= 0])
         return self.n_steps - self._first_step
 
     def in_loop(self) -> tuple[OneSolve, Showing, float]:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +19,20 @@ from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.kernels import native
+from catenary.solver.model.beam import MOST_ROTATION
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
 
 # Links of a long line that may switch in one step: mostly it is some ten. These take 7 MB.
 _MOST_LINKS = 512
 
+# Time in which all rotations of wires are looked at once [s], as a run does.
+_LOOKS = 1.0
 
-def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, int]) -> None:
+
+def write_line(
+    path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, int], turns: np.ndarray
+) -> None:
     """Write a line as it is now, with what steps to come depend on. Not collective.
 
     Parameters
@@ -37,6 +45,8 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
         Time step [s].
     steps : tuple of int
         Numbers of the latest step and of the last one to come.
+    turns : ndarray
+        Unknowns of rotation of all wires.
 
     Raises
     ------
@@ -70,12 +80,25 @@ def write_line(path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, i
         ties=np.array([model.tie for model in models], dtype=native.TIE),
         one_speed=pantographs.along_track or bool(drives[..., N_DRIVE:].any()),
         longest_way=end - float(pantographs.places_along.start.max()),
+        turns=turns.astype(np.int64),
+        most_turn=MOST_ROTATION,
+        look_steps=max(1, round(_LOOKS / dt)),
     )
     pantographs.move_to(first * dt)
+    # An earlier file stays until this one is whole. A device takes what is written as it comes.
+    made_as = path
+    if path.is_file() or not path.exists():
+        made_as = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        blocks.steps().write(str(path), ahead)
-    except RuntimeError as error:
+        blocks.steps().write(str(made_as), ahead)
+        if made_as != path:
+            made_as.replace(path)
+    except (OSError, RuntimeError) as error:
         raise RunBroken(f"{path}: {error}: free some space or choose another file") from error
+    finally:
+        if made_as != path:
+            with contextlib.suppress(OSError):
+                made_as.unlink(missing_ok=True)
 
 
 def make_room(scheme: OneSolve) -> None:

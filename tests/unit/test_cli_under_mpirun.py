@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
-from program import MPIRUN, Done, catenary
+from program import ENTRY, MPIRUN, Done, catenary, started
 
 pytestmark = [
     pytest.mark.process,
@@ -42,6 +43,18 @@ def test_bad_input_is_told_once_and_every_rank_ends_with_2(
     assert done.stderr.count(sentence) == 1, done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ranks_with_other_words_are_refused(tmp_path: Path) -> None:
+    # One left out an option and ended, and the other one waited for it.
+    words = "run en50318_2002 -o out --set train.speed_km_h=20"
+    rank = "${OMPI_COMM_WORLD_RANK:-$PMI_RANK}"
+    script = f'exec {sys.executable} -c "$0" {words}{rank}'
+    with started(["sh", "-c", script, ENTRY], tmp_path, ranks=2) as program:
+        done = program.end()
+    assert done.code == 2, done.stderr
+    assert done.stderr.count("the processes of mpirun have different words") == 1, done.stderr
+    assert list(tmp_path.iterdir()) == [] and not done.left
 
 
 def test_a_serial_verb_is_done_once(tmp_path: Path) -> None:

@@ -222,6 +222,15 @@ def test_samples_are_half_a_period_of_the_filter_apart() -> None:
     assert by_time.place == pytest.approx(found.place)
 
 
+@pytest.mark.parametrize(("is_filtered", "filter_hz"), [(False, 62.5), (True, 124.0)])
+def test_the_fewest_samples_of_a_filter_have_noise_of_full_rank(
+    is_filtered: bool, filter_hz: float
+) -> None:
+    found = measurement(samples(), is_filtered=is_filtered, filter_Hz=filter_hz)
+    (signal,) = found.signals
+    assert np.isfinite(signal.whitening.of(signal.values)).all()
+
+
 def test_units_of_columns_are_converted() -> None:
     table = samples()
     table["kN"], table["km"] = table.F / 1e3, table.x / 1e3
@@ -342,7 +351,8 @@ def test_separators_at_the_end_of_lines_make_no_column(tmp_path: Path) -> None:
     [
         ({"force": {"column": "Q", "noise": 1.0}}, 'm.csv has no column "Q": it has x, t, F'),
         ({"from_m": 290.0, "to_m": 300.0}, "reaches from 100.0 to 300.0 m .* takes 20 to 8000"),
-        ({"is_filtered": False, "filter_Hz": 200.0}, "has 250 samples .* takes more than 400"),
+        ({"is_filtered": False, "filter_Hz": 200.0}, "has 250 samples .* takes at least 800 of v"),
+        ({"is_filtered": False, "filter_Hz": 63.0}, "takes at least 252 of values that are not fi"),
         ({"is_filtered": True, "filter_Hz": 200.0}, "has 250 samples .* takes more than 400"),
     ],
 )
@@ -394,6 +404,8 @@ SOUGHT = [{"key": FORCE, "deviation": 4.0}]
         ({"measured": MEASURED, "droppers": {"spans": [], "deviation_mm": 2.0}}, "droppers.spans"),
         ({"measured": MEASURED, "droppers": {"spans": [5, 5], "deviation_mm": 2.0}},
          "must name each span once"),
+        ({"measured": {**MEASURED, "filter_Hz": 1e-308}, "parameters": SOUGHT},
+         "measured.filter_Hz is 1e-308 in t.toml; it must be at least 0.001"),
         ({"measured": {**MEASURED, "from_m": 300.0, "to_m": 200.0}, "parameters": SOUGHT},
          "must have to_m greater than from_m, but they are 200 and 300"),
         ({"measured": {**MEASURED, "force": {"column": "F", "noise": 1.0, "unit": "kg"}},

@@ -38,6 +38,8 @@ REFUSED = {
     "no auxiliary wire": (COMPOUND, ["line.auxiliary_wire="], "line.auxiliary_wire .* is missing"),
     "long stitch wires": (RE330, ["line.stitch_wire.length_m=65"],
                           "length_m is 65 m .* it must be less than the shortest span .65 m."),
+    "stitch wires of no length": (RE330, ["line.stitch_wire.length_m=1e-299"],
+                                  "it must be at least 0.1 .m."),
     "short stitch wires": (RE330, ["line.stitch_wire.length_m=9"],
                            "no dropper would hang from it: the nearest one is 5 m"),
     "clamp on a dropper": (RE330, ["line.stitch_wire.length_m=10"],

@@ -98,7 +98,7 @@ class AuxiliaryWireTable(WireTable):
 class ClampedWireTable(WireTable):
     """A wire over each inner support, clamped to another one on both sides of it."""
 
-    length_m: float = Field(gt=0, le=100, description="length from clamp to clamp")
+    length_m: float = Field(ge=0.1, le=100, description="length from clamp to clamp")
     clamp_kg: float = Field(0.0, ge=0, le=100, description="mass of each of its two clamps")
     clamp_stiffness_N_per_m: float = Field(
         1e7, gt=0, le=1e10, description="stiffness of each clamp, in tension and compression"

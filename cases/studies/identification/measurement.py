@@ -64,6 +64,9 @@ class Whitening:
 FORCE, HEIGHT = "force", "head height"
 UNITS = {FORCE: "N", HEIGHT: "m"}
 _MOST_SAMPLES = 8000  # their covariance takes half a gigabyte
+# Raw samples that half a period of the filter takes at least. Of fewer all would be kept, and the
+# filter leaves nothing at half of their rate: the covariance of their noise is singular.
+_RAW = 2.0
 # A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
 _SETTLED = 6.0
 # Of what is faster than so many cut-offs the filter leaves 0.8 %, of the noise's deviation 0.2 %;
@@ -138,16 +141,21 @@ class Measurement:
         end = stretch[1] if task.to_m is None else task.to_m
         within = np.flatnonzero((begin <= places) & (places <= end))
         margin = 0
-        if dt * 2.0 * task.filter_Hz >= 1.0:
+        # Samples in half a period of the filter.
+        dense = 0.5 / (task.filter_Hz * dt)
+        if dense <= 1.0 or not task.is_filtered and dense < _RAW - 1e-6:
+            least = f"more than {2 * task.filter_Hz:g}"
+            if not task.is_filtered:
+                least = f"at least {2 * _RAW * task.filter_Hz:g} of values that are not filtered"
             raise InputError(
                 f"{path} has {1.0 / dt:.4g} samples a second at the train's {3.6 * speed:g} km/h; "
-                f"measured.filter_Hz = {task.filter_Hz:g} takes more than {2 * task.filter_Hz:g}"
+                f"measured.filter_Hz = {task.filter_Hz:g} takes {least}"
             )
         if not task.is_filtered:
             margin = int(np.ceil(_SETTLED / (task.filter_Hz * dt)))
             within = within[(within >= margin) & (within < len(places) - margin)]
         # A signal of this bandwidth is known from samples half a period of it apart.
-        kept = within[:: max(1, int(0.5 / (task.filter_Hz * dt) + 1e-6))]
+        kept = within[:: max(1, int(dense + 1e-6))]
         if not LEAST_SAMPLES <= kept.size <= _MOST_SAMPLES:
             raise InputError(
                 f"{path} reaches from {places[0]:.1f} to {places[-1]:.1f} m of the line and has "

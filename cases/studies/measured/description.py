@@ -88,7 +88,7 @@ class Measured(Table):
     force: Force | None = None
     head_height: Height | None = None
     pantograph: _NUMBER = 1
-    filter_Hz: Annotated[float, Field(gt=0.0, le=1e3)] = 20.0
+    filter_Hz: Annotated[float, Field(ge=1e-3, le=1e3)] = 20.0
     is_filtered: bool = True
     from_m: float | None = None
     to_m: float | None = None

@@ -18,7 +18,14 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
-from catenary.postproc.files.disk import MARGIN, check_in_place, opened, reserve, write_at
+from catenary.postproc.files.disk import (
+    MARGIN,
+    check_in_place,
+    check_uncut,
+    opened,
+    reserve,
+    write_at,
+)
 from catenary.postproc.files.hdf5.checked import put_array, set_attribute
 from catenary.postproc.files.own_files import new_part
 from catenary.postproc.record.snapshots.blocks import Block
@@ -76,7 +83,7 @@ class FieldsFile:
         self._planned: list[float] = []
         self._layout: list[Slots] = []
         self._text: GrowingXdmf | None = None
-        self._handle = -1
+        self._handle, self._size = -1, 0
         self.is_published = False
 
     def make(self, numbers: np.ndarray) -> None:
@@ -102,7 +109,7 @@ class FieldsFile:
         except BaseException:
             self._made_as.unlink(missing_ok=True)
             raise
-        self._handle = os.open(self._made_as, os.O_RDWR)
+        self._open(self._made_as)
 
     def resume(self, numbers: np.ndarray, start_time: float) -> bool:
         """Continue the file from ``start_time`` [s] on; False if it is not as it was.
@@ -151,7 +158,7 @@ class FieldsFile:
             )
             self._written = []
             return False
-        self._handle = os.open(self.path, os.O_RDWR)
+        self._open(self.path)
         self.is_published = True
         self._describe()
         return True
@@ -181,6 +188,7 @@ class FieldsFile:
 
     def append(self, times: list[float], known: Gathered) -> None:
         """Write snapshots at ``times`` [s]; OSError if that fails."""
+        check_uncut(self.path, self._handle, self._size)
         first = len(self._written)
         for slots, places in zip(self._layout, self._places, strict=True):
             for kind in slots.kinds:
@@ -206,6 +214,10 @@ class FieldsFile:
         if not self.is_published:
             with contextlib.suppress(OSError):
                 self._made_as.unlink(missing_ok=True)
+
+    def _open(self, path: Path) -> None:
+        self._handle = os.open(path, os.O_RDWR)
+        self._size = os.fstat(self._handle).st_size
 
     def _plan(self, numbers: np.ndarray) -> None:
         # To the last digit the times of the steps: readers take any other for a time of its own.

@@ -16,6 +16,7 @@ static_assert(sizeof(catenary_input) == sizeof(Input));
 static_assert(CATENARY_DONE == int(Simulation::Outcome::kDone));
 static_assert(CATENARY_NOT_FOUND == int(Simulation::Outcome::kNotFound));
 static_assert(CATENARY_AT_END == int(Simulation::Outcome::kAtEnd));
+static_assert(CATENARY_TURNED == int(Simulation::Outcome::kTurned));
 
 catenary_simulation* catenary_open(const char* path, char* error, size_t n_error) {
     std::string why;

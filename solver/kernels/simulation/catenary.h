@@ -26,12 +26,15 @@ typedef struct {
     double base_acceleration; /* of that; only pantographs with bodies read it */
 } catenary_input;
 
-/* What a step ended with. */
+/* What a step ended with. After CATENARY_NOT_FOUND and CATENARY_TURNED no further step is taken
+ * until an earlier state is restored. */
 enum {
     CATENARY_DONE = 0,
     CATENARY_NOT_FOUND = 1, /* no forces fit it, or a mechanism would leave the heights that it can
-                             * reach: nothing can be stepped further but from an earlier state */
-    CATENARY_AT_END = 2     /* the file has no inputs for a further step */
+                             * reach */
+    CATENARY_AT_END = 2,    /* the file has no inputs for a further step */
+    CATENARY_TURNED = 3     /* a wire has turned by more than 1 rad from rest: the line, which is
+                             * linear, has run away */
 };
 
 /* Read a line; NULL if that fails: `error` then holds why, in up to n_error bytes. */

@@ -10,25 +10,6 @@ namespace {
 
 constexpr size_t kPage = 4096;
 
-/// FNV-1a, by words of eight bytes: it detects damaged files, not forged ones.
-class CheckSum {
-  public:
-    void take(const void* data, size_t n) {
-        const auto* bytes = static_cast<const unsigned char*>(data);
-        for (; n >= 8; n -= 8, bytes += 8) {
-            uint64_t word;
-            std::memcpy(&word, bytes, 8);
-            put(word);
-        }
-        for (; n > 0; --n) put(*bytes++);
-    }
-    uint64_t sum() const { return sum_; }
-
-  private:
-    void put(uint64_t word) { sum_ = (sum_ ^ word) * 0x100000001b3u; }
-    uint64_t sum_ = 0xcbf29ce484222325u;
-};
-
 class FileOutput {
   public:
     explicit FileOutput(const std::string& path) : file_(path, std::ios::binary) {
@@ -86,6 +67,16 @@ struct BlockHeader {
 };
 
 }  // namespace
+
+void CheckSum::take(const void* data, size_t n) {
+    const auto* bytes = static_cast<const unsigned char*>(data);
+    for (; n >= 8; n -= 8, bytes += 8) {
+        uint64_t word;
+        std::memcpy(&word, bytes, 8);
+        put(word);
+    }
+    for (; n > 0; --n) put(*bytes++);
+}
 
 std::vector<MemoryBlock> BlockFinder::blocks() {
     std::ranges::sort(found_, {}, &MemoryBlock::begin);

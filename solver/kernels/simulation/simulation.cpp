@@ -70,6 +70,7 @@ void write_line(const std::string& path, PreparedLine& line) {
 struct Simulation::Place {
     int64_t n_done;
     Course course;
+    int64_t latest;
 };
 
 Simulation::Simulation(const std::string& path) {
@@ -88,6 +89,7 @@ void Simulation::make_steps() {
     const size_t n = line_.heads.size();
     if (n == 0 || ahead.drives.rows != static_cast<int64_t>(n) || ahead.ties.size() != n)
         throw std::runtime_error("pantographs are missing in it");
+    if (ahead.look_steps < 1) throw std::runtime_error("it never looks at its wires");
     try {
         free_ = std::make_unique<TwoPasses>(line_.passes);
         for (const HeadParts& head : line_.heads) heads_.push_back(head_of(head));
@@ -114,9 +116,9 @@ void Simulation::make_steps() {
 
 Simulation::Outcome Simulation::step(int64_t n) {
     const FlushedSubnormals flushed;
-    auto outcome = Outcome::kDone;
-    for (int64_t k = 0; k < n && outcome == Outcome::kDone; ++k) outcome = take_one();
-    return outcome;
+    if (latest_ == Outcome::kAtEnd) latest_ = Outcome::kDone;  // it may have another speed now
+    for (int64_t k = 0; k < n && latest_ == Outcome::kDone; ++k) latest_ = take_one();
+    return latest_;
 }
 
 Simulation::Outcome Simulation::take_one() {
@@ -126,7 +128,19 @@ Simulation::Outcome Simulation::take_one() {
     drive_next();
     if (steps_->take(0, 1).n_steps == 0) return Outcome::kNotFound;
     ++n_done_;
-    return Outcome::kDone;
+    return has_turned() ? Outcome::kTurned : Outcome::kDone;
+}
+
+/// Whether one of the wires' rotations is beyond what the line bears. A step looks at a part of
+/// them, so that it takes no longer than the one before.
+bool Simulation::has_turned() const {
+    const Ahead& ahead = line_.ahead;
+    const int64_t n = size(ahead.turns), part = n_done_ % ahead.look_steps;
+    for (int64_t k = n * part / ahead.look_steps; k < n * (part + 1) / ahead.look_steps; ++k)
+        if (!(std::abs(displacement_at(ahead.turns[k], line_.steps.shown.motion)) <=
+              ahead.most_turn))
+            return true;
+    return false;
 }
 
 /// Put the inputs of the next step: the file's plus the host's.
@@ -160,7 +174,7 @@ void Simulation::save(std::byte* state) const {
         std::memcpy(state, from, n);
         state += n;
     };
-    const Place place{n_done_, steps_->course()};
+    const Place place{n_done_, steps_->course(), static_cast<int64_t>(latest_)};
     put(&place, sizeof place);
     put(inputs_.data(), inputs_.size() * sizeof(Input));
     for (const OwnBlock& own : blocks_)
@@ -175,6 +189,7 @@ void Simulation::restore(const std::byte* state) {
     Place place;
     get(&place, sizeof place);
     n_done_ = place.n_done;
+    latest_ = static_cast<Outcome>(place.latest);
     steps_->set_course(place.course);
     get(inputs_.data(), inputs_.size() * sizeof(Input));
     for (OwnBlock& own : blocks_)

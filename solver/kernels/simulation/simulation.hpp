@@ -39,14 +39,17 @@ struct Tie {
 
 /// Inputs of the steps to come.
 struct Ahead {
-    double dt;                    ///< [s]
-    int64_t n_done;               ///< steps taken from time zero on
-    Array3<const double> drives;  ///< (n, n_heads, width) a row for each head, see `Drive`
-    std::span<const Tie> ties;    ///< of each pantograph
-    bool one_speed;               ///< whether drives hold for the train's first speed only
-    double longest_way;           ///< of the train, to where the line ends [m]
-    CATENARY_RECORD(dt, n_done, drives, ties, one_speed, longest_way)
-    CATENARY_SHAPES("*, *, * h *, h")
+    double dt;                       ///< [s]
+    int64_t n_done;                  ///< steps taken from time zero on
+    Array3<const double> drives;     ///< (n, n_heads, width) a row for each head, see `Drive`
+    std::span<const Tie> ties;       ///< of each pantograph
+    bool one_speed;                  ///< whether drives hold for the train's first speed only
+    double longest_way;              ///< of the train, to where the line ends [m]
+    std::span<const int64_t> turns;  ///< unknowns of rotation of all wires
+    double most_turn;                ///< from rest, up to which the line is linear [rad]
+    int64_t look_steps;              ///< steps in which each of them is looked at once
+    CATENARY_RECORD(dt, n_done, drives, ties, one_speed, longest_way, turns, most_turn, look_steps)
+    CATENARY_SHAPES("*, *, * h *, h, *, *, *")
 };
 
 /// All that a prepared line is.
@@ -81,10 +84,12 @@ class Simulation {
     enum class Outcome {
         kDone,
         kNotFound,  ///< no forces fit a step, or a mechanism would leave the heights that it can
-                    ///< reach: nothing can be stepped further
+                    ///< reach
         kAtEnd,     ///< the line ends, or the file has no inputs for a further step
+        kTurned,    ///< a wire has turned by more than `Ahead::most_turn`
     };
-    /// Take n steps, as far as that is possible.
+    /// Take n steps, as far as that is possible. What is not found, or has turned, stays so until
+    /// an earlier state is restored.
     Outcome step(int64_t n);
 
     double time() const { return n_done_ * line_.ahead.dt; }  ///< [s]
@@ -106,6 +111,7 @@ class Simulation {
     struct Place;
     void make_steps();
     Outcome take_one();
+    bool has_turned() const;
     void drive_next();
 
     std::vector<OwnBlock> blocks_;
@@ -119,6 +125,7 @@ class Simulation {
     std::vector<Counts> counts_ = {Counts{}};
     std::optional<Steps> steps_;
     int64_t n_done_ = 0;
+    Outcome latest_ = Outcome::kDone;
     size_t state_size_ = 0;
 };
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -240,6 +242,22 @@ def test_line_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     if Path("/dev/full").exists():
         with pytest.raises(RunBroken, match="to its end: free some space"):
             prepare_line(acting_scene("ac_simple"), Path("/dev/full"))
+
+
+def test_an_earlier_file_stays_where_a_line_cannot_be_written_whole(tmp_path: Path) -> None:
+    file = tmp_path / "a.line"
+    file.write_text("the earlier line")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+        with pytest.raises(RunBroken, match="a.line: it cannot be written to its end"):
+            prepare_line(acting_scene("ac_simple"), file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert file.read_text() == "the earlier line"
+    assert [one.name for one in tmp_path.iterdir()] == ["a.line"]
 
 
 def test_steps_from_python_need_no_petsc(line: Path) -> None:

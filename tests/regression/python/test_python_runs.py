@@ -14,6 +14,7 @@ import threading
 import time
 import weakref
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -109,8 +110,13 @@ def test_every_channel_is_that_of_the_file(in_memory: catenary.Run, folder: Path
         assert np.array_equal(force.dropper, results.line("dropper_x"))
         assert np.array_equal(in_memory.force.position, results.channel("contact_position"))
         assert in_memory.channel("kinetic").dims == ("time",)
-    with pytest.raises(catenary.InputError, match="no record spam; it has contact_position, "):
+    with pytest.raises(catenary.InputError, match='no record "spam"; it has contact_position, '):
         in_memory.channel("spam")
+    for wrong in (np.zeros(2), pd.DataFrame({"contact_force": [1]}), None):
+        with pytest.raises(catenary.InputError, match="the run has no record"):
+            in_memory.channel(wrong)  # type: ignore[arg-type]
+        with pytest.raises(catenary.InputError, match="the run has no picture"):
+            in_memory.plot(wrong)  # type: ignore[arg-type]
 
 
 def test_thinned_records_have_times_of_their_own(scene: catenary.Scene) -> None:
@@ -473,6 +479,17 @@ def test_values_of_all_kinds_reach_their_scenes() -> None:
 # --- pictures -----------------------------------------------------------------------------------
 
 
+def test_threads_read_one_run_side_by_side(in_memory: catenary.Run) -> None:
+    names = ("arm_uplift", "dropper_force", "contact_force", "head_height") * 4
+
+    def sums(_: int) -> list[float]:
+        return [float(in_memory.channel(name).sum()) for name in names]
+
+    expected = sums(0)
+    with ThreadPoolExecutor(8) as pool:
+        assert all(found == expected for found in pool.map(sums, range(40)))
+
+
 def test_pictures_are_those_of_the_report(in_memory: catenary.Run) -> None:
     plot = in_memory.plot
     made = {
@@ -493,7 +510,7 @@ def test_pictures_are_those_of_the_report(in_memory: catenary.Run) -> None:
     force = made["contact_force"].axes[0]
     assert force.get_xlabel() == "position along the track [m]"
     assert len({str(own) for own in labels.values()}) == len(made)
-    with pytest.raises(catenary.InputError, match="no picture spam; it has contact_force, "):
+    with pytest.raises(catenary.InputError, match='no picture "spam"; it has contact_force, '):
         plot("spam")
 
 

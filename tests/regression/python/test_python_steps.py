@@ -222,11 +222,50 @@ def test_a_step_that_cannot_be_taken_says_when_and_why_and_a_state_goes_on(
         sim.step(100)
         state = sim.save()
         sim.lift_force[0] = np.nan  # not checked: a view, for loops that must be quick
-        says = rf"taken after {sim.time:g} s: lift_force is \[nan\]; it must be finite"
+        says = rf"after {sim.time:g} s a step could not be taken, .*: lift_force is \[nan\]; it must be finite"
         with pytest.raises(catenary.RunBroken, match=says):
+            sim.step()
+        sim.lift_force = 0.0
+        broken = sim.save()
+        with pytest.raises(catenary.RunBroken, match="restore\\(\\) an earlier state"):
+            sim.step()  # half of that step was taken, so that no other one can follow
+        sim.restore(state)
+        sim.restore(broken)
+        with pytest.raises(catenary.RunBroken, match="found after"):
             sim.step()
         sim.restore(state)
         assert sim.step() and np.isfinite(sim.contact_force).all()
+
+
+def test_a_line_that_runs_away_under_a_controller_says_so(scene: catenary.Scene) -> None:
+    with catenary.Simulation(scene) as sim:
+        sim.step(200)
+        height, state = sim.head_height[0], sim.save()
+
+        def drive_on() -> None:
+            nonlocal height
+            while sim.step():
+                rise, height = sim.head_height[0] - height, sim.head_height[0]
+                sim.head_force = (5000.0 * rise / sim.dt).clip(-1e300, 1e300)  # with the motion
+
+        with pytest.raises(catenary.RunBroken, match="a wire has turned by more than 1 rad"):
+            drive_on()
+        with pytest.raises(catenary.RunBroken, match="a wire has turned"):
+            sim.step()
+        sim.restore(state)
+        assert sim.step(100)
+
+
+def test_a_damaged_state_is_refused(scene: catenary.Scene) -> None:
+    # Numbers of places are in it: with one of them changed the process ended.
+    with catenary.Simulation(scene) as sim:
+        state = sim.save()
+        for at in range(0, len(state), len(state) // 97):
+            damaged = bytearray(state)
+            damaged[at] ^= 64
+            with pytest.raises(catenary.InputError, match="no state of this line"):
+                sim.restore(damaged)
+        sim.restore(state)
 
 
 def test_a_prepared_file_is_the_scene_that_it_was_made_of(

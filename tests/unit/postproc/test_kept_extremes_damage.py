@@ -44,6 +44,15 @@ def test_a_count_that_is_no_single_whole_number_counts_as_not_kept(
     assert extremes_at(file, 10) is not None
 
 
+def test_those_of_the_first_row_are_there_for_a_run_that_begins_again(file: h5py.File) -> None:
+    # A run that broke before its state was renewed goes on from the start, before which no row is.
+    store_extremes(file, 1, extremes(1.0))
+    store_extremes(file, 20, extremes(2.0))
+    drop_extremes(file, 0)
+    kept = extremes_at(file, 0)
+    assert kept is not None and kept["arm_uplift"].max() == 1.0
+
+
 def test_a_checksum_of_another_shape_is_not_kept(file: h5py.File) -> None:
     group, arrays = file.create_group("some"), {"a": np.arange(3.0)}
     assert sum_is_kept(group, arrays) is None

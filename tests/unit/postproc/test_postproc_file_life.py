@@ -100,6 +100,7 @@ TAKEN = {
     "replaced": "was replaced by another file while the run went on",
     "removed": "run.h5 was removed while the run went on",
     "folder removed": "the folder .*out was removed while the run went on",
+    "cut": "another program has cut .*run.h5 to 1000 bytes while the run went on",
     "folder moved": "`catenary restart .*elsewhere` continues the run",
 }
 
@@ -113,6 +114,8 @@ def test_a_file_that_is_taken_away_ends_the_run(how: str, tmp_path: Path, make_m
     if how == "replaced":
         (tmp_path / "mine").write_text("mine")
         os.replace(tmp_path / "mine", path)
+    elif how == "cut":
+        os.truncate(path, 1000)
     elif how == "folder moved":
         path.parent.rename(tmp_path / "elsewhere")
     else:
@@ -126,12 +129,25 @@ def test_a_file_that_is_taken_away_ends_the_run(how: str, tmp_path: Path, make_m
     assert "ended at t = 0.059 s" in str(caught.value)
     if how == "replaced":  # not a byte longer
         assert path.read_text() == "mine"
+    elif how == "cut":  # HDF5 crashed here at the end, and nothing was said before
+        assert path.stat().st_size == 1000
     elif how == "folder moved":
         with Results(tmp_path / "elsewhere") as results:
             assert results.outcome == str(caught.value)
             assert results.n_steps == 59 == results.checkpoint["step"]
     else:
         assert list(tmp_path.glob("out/*")) == []
+
+
+def test_snapshots_that_are_cut_end_the_run(tmp_path: Path, make_march: Any) -> None:
+    march = make_march(n_steps=40)
+    path = tmp_path / "fields.xdmf"
+    watcher = FieldRecorder(march.comm, path, march.recorded, every=10, flush_every=10)
+    watcher.start(march.stage())
+    show(watcher, march, 0, 10)
+    os.truncate(tmp_path / "fields.h5", 0)
+    with pytest.raises(RunBroken, match="another program has cut .*fields.h5 to 0 bytes"):
+        show(watcher, march, 11, 40)
 
 
 def test_snapshots_wait_for_the_result_file(tmp_path: Path, make_march: Any) -> None:
