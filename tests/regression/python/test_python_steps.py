@@ -222,7 +222,7 @@ def test_a_step_that_cannot_be_taken_says_when_and_why_and_a_state_goes_on(
         sim.step(100)
         state = sim.save()
         sim.lift_force[0] = np.nan  # not checked: a view, for loops that must be quick
-        says = rf"after {sim.time:g} s a step could not be taken, .*: lift_force is \[nan\]; it must be finite"
+        says = rf"after {sim.time:g} s a step could not be taken, .*: lift_force is \[nan\]; it must"
         with pytest.raises(catenary.RunBroken, match=says):
             sim.step()
         sim.lift_force = 0.0
@@ -231,7 +231,7 @@ def test_a_step_that_cannot_be_taken_says_when_and_why_and_a_state_goes_on(
             sim.step()  # half of that step was taken, so that no other one can follow
         sim.restore(state)
         sim.restore(broken)
-        with pytest.raises(catenary.RunBroken, match="found after"):
+        with pytest.raises(catenary.RunBroken, match="could not be taken"):
             sim.step()
         sim.restore(state)
         assert sim.step() and np.isfinite(sim.contact_force).all()
