@@ -222,7 +222,7 @@ def test_a_step_that_cannot_be_taken_says_when_and_why_and_a_state_goes_on(
         sim.step(100)
         state = sim.save()
         sim.lift_force[0] = np.nan  # not checked: a view, for loops that must be quick
-        says = rf"after {sim.time:g} s a step could not be taken, .*: lift_force is \[nan\]; it must"
+        says = rf"after {sim.time:g} s a step could not be taken, .*: lift_force is \[nan\]; it"
         with pytest.raises(catenary.RunBroken, match=says):
             sim.step()
         sim.lift_force = 0.0
