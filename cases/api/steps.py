@@ -240,9 +240,10 @@ class Simulation:
         Raises
         ------
         InputError
-            If it is negative or no number, or if heads of the scene roll or bend, its vehicle
-            follows a track, or its pantographs meet tunnels or stretches of another wind: what a
-            pantograph meets at a place is prepared for one speed.
+            If it is negative or no number, if it is not below the wave speed of the contact wire
+            and ``effects.supercritical_speed`` is not on, or if heads of the scene roll or bend,
+            its vehicle follows a track, or its pantographs meet tunnels or stretches of another
+            wind: what a pantograph meets at a place is prepared for one speed.
 
         Examples
         --------
@@ -258,6 +259,11 @@ class Simulation:
             return
         if not (np.isfinite(value) and value >= 0.0):
             raise InputError(f"speed is {value}; it must be at least 0 [m/s] and finite")
+        if value >= self._own.most_speed:
+            raise InputError(
+                f"speed is {value:g} m/s; it must be below the wave speed of the contact wire "
+                f"({self._own.most_speed:.4g} m/s) unless effects.supercritical_speed = true"
+            )
         raise InputError(
             f"speed cannot be set to {value:g} m/s: heads of this scene roll or bend, its vehicle "
             "follows a track, or its pantographs meet tunnels or stretches of another wind, and "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 
 import catenary.solver.kernels
@@ -9,6 +10,8 @@ from catenary.base.mpi import MPI
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.scene import Scene
+from catenary.solver.effects.effect import Limit
+from catenary.solver.problem.problem import slowest_wave_speed
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
@@ -40,5 +43,8 @@ def prepare_line(scene: Scene, path: Path) -> int:
     RunBroken
         If the file cannot be written.
     """
-    with March(MPI.COMM_SELF, *sound_rest(scene)) as march:
-        return march.write_line(path)
+    at_rest = sound_rest(scene)
+    slower = scene.holds(Limit.WAVE_SPEED)
+    below = slowest_wave_speed(at_rest.problem) if slower else inf
+    with March(MPI.COMM_SELF, *at_rest) as march:
+        return march.write_line(path, below)

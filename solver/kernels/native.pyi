@@ -30,7 +30,7 @@ Across = namedtuple("Across", "place, rate, moved")
 Affine = namedtuple("Affine", "place, rate, by_force, rate_by_force")
 Ahead = namedtuple(
     "Ahead",
-    "dt, n_done, drives, ties, one_speed, longest_way, turns, most_turn, look_steps",
+    "dt, n_done, drives, ties, one_speed, most_speed, longest_way, turns, most_turn, look_steps",
 )
 Alpha = namedtuple(
     "Alpha",
@@ -413,6 +413,8 @@ class Simulation:
     def way(self) -> float: ...
     @property
     def speed(self) -> float: ...
+    @property
+    def most_speed(self) -> float: ...
     @property
     def n_steps_left(self) -> int: ...
     @property

@@ -329,10 +329,10 @@ class March:
             finishing,
         )
 
-    def write_line(self, path: Path) -> int:
+    def write_line(self, path: Path, most_speed: float) -> int:
         """Write a line that is stepped from outside, see `prepared_line`; for how many steps.
 
-        Not collective; one rank only.
+        Its train can be given speeds below ``most_speed`` [m/s]. Not collective; one rank only.
 
         Raises
         ------
@@ -348,7 +348,8 @@ class March:
         assert blocks is not None
         numbering = self._changed.model.numbering
         turns = numbering.numbers[:, [name.startswith("theta") for name in numbering.names]]
-        write_line(path, blocks, dt, (self._first_step, self.n_steps), turns[turns >= 0])
+        steps = self._first_step, self.n_steps
+        write_line(path, blocks, dt, steps, turns[turns >= 0], most_speed)
         return self.n_steps - self._first_step
 
     def in_loop(self) -> tuple[OneSolve, Showing, float]:

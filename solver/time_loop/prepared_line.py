@@ -31,7 +31,12 @@ _LOOKS = 1.0
 
 
 def write_line(
-    path: Path, blocks: CompiledSteps, dt: float, steps: tuple[int, int], turns: np.ndarray
+    path: Path,
+    blocks: CompiledSteps,
+    dt: float,
+    steps: tuple[int, int],
+    turns: np.ndarray,
+    most_speed: float,
 ) -> None:
     """Write a line as it is now, with what steps to come depend on. Not collective.
 
@@ -47,6 +52,8 @@ def write_line(
         Numbers of the latest step and of the last one to come.
     turns : ndarray
         Unknowns of rotation of all wires.
+    most_speed : float
+        Speed of the slowest wave, below which the train can be given any speed, or infinite [m/s].
 
     Raises
     ------
@@ -79,6 +86,7 @@ def write_line(
         drives,
         ties=np.array([model.tie for model in models], dtype=native.TIE),
         one_speed=pantographs.along_track or bool(drives[..., N_DRIVE:].any()),
+        most_speed=most_speed,
         longest_way=end - float(pantographs.places_along.start.max()),
         turns=turns.astype(np.int64),
         most_turn=MOST_ROTATION,

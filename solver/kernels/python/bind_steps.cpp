@@ -114,6 +114,7 @@ void offer_steps(py::module_& module) {
         .def_property_readonly("dt", &HeldSimulation::dt)
         .def_property_readonly("way", &HeldSimulation::way)
         .def_property_readonly("speed", &HeldSimulation::speed)
+        .def_property_readonly("most_speed", &HeldSimulation::most_speed)
         .def_property_readonly("n_steps_left", &HeldSimulation::n_steps_left)
         .def_property_readonly("inputs", viewed([](HeldSimulation& own) { return own.inputs(); }))
         .def_property_readonly("contact_force", output(&TrainOutputs::contact_force))

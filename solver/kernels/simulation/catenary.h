@@ -48,8 +48,10 @@ CATENARY_API double catenary_time(const catenary_simulation* simulation);
 CATENARY_API double catenary_time_step(const catenary_simulation* simulation);
 CATENARY_API int64_t catenary_steps_left(const catenary_simulation* simulation);
 /* Way of the train since time zero, and its speed; another one holds from the next step on. It is
- * refused, with a value other than 0, if the file has what pantographs meet at their places at one
- * speed: wires across their strips, the track below the vehicle, tunnels, stretches of the wind. */
+ * refused, with a value other than 0, if it is negative or not below the speed of the slowest wave
+ * (as long as effects.supercritical_speed does not allow that), or if the file has what pantographs
+ * meet at their places at one speed: wires across their strips, the track below the vehicle,
+ * tunnels, stretches of the wind. */
 CATENARY_API double catenary_way(const catenary_simulation* simulation);
 CATENARY_API double catenary_speed(const catenary_simulation* simulation);
 CATENARY_API int catenary_set_speed(catenary_simulation* simulation, double speed);

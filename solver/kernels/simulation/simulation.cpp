@@ -164,7 +164,8 @@ void Simulation::drive_next() {
 }
 
 bool Simulation::set_speed(double speed) {
-    if (line_.ahead.one_speed || !(speed >= 0.0 && std::isfinite(speed))) return false;
+    if (line_.ahead.one_speed || !(speed >= 0.0 && speed < most_speed() && std::isfinite(speed)))
+        return false;
     steps_->change_speed(time(), speed);
     return true;
 }

@@ -44,12 +44,14 @@ struct Ahead {
     Array3<const double> drives;     ///< (n, n_heads, width) a row for each head, see `Drive`
     std::span<const Tie> ties;       ///< of each pantograph
     bool one_speed;                  ///< whether drives hold for the train's first speed only
+    double most_speed;               ///< below which the train can have any speed [m/s]
     double longest_way;              ///< of the train, to where the line ends [m]
     std::span<const int64_t> turns;  ///< unknowns of rotation of all wires
     double most_turn;                ///< from rest, up to which the line is linear [rad]
     int64_t look_steps;              ///< steps in which each of them is looked at once
-    CATENARY_RECORD(dt, n_done, drives, ties, one_speed, longest_way, turns, most_turn, look_steps)
-    CATENARY_SHAPES("*, *, * h *, h, *, *, *")
+    CATENARY_RECORD(dt, n_done, drives, ties, one_speed, most_speed, longest_way, turns, most_turn,
+                    look_steps)
+    CATENARY_SHAPES("*, *, * h *, h, *, *, *, *")
 };
 
 /// All that a prepared line is.
@@ -96,6 +98,7 @@ class Simulation {
     double dt() const { return line_.ahead.dt; }
     double way() const { return steps_->way(time()); }  ///< of the train since it started [m]
     double speed() const { return steps_->course().speed; }
+    double most_speed() const { return line_.ahead.most_speed; }
     /// Give the train another speed [m/s], if it can have one; whether it can.
     bool set_speed(double speed);
     std::span<Input> inputs() { return inputs_; }  ///< of each pantograph

@@ -181,9 +181,15 @@ def test_speeds_that_cannot_be_are_refused(scene: catenary.Scene) -> None:
         for speed in (-1.0, np.nan, np.inf):
             with pytest.raises(catenary.InputError, match="must be at least 0"):
                 sim.speed = speed
+        # That of 22 kN and 1.35 kg/m.
+        with pytest.raises(catenary.InputError, match=r"below the wave speed .* \(127\.7 m/s\)"):
+            sim.speed = 128.0
         sim.speed = 0.0
         sim.step(10)
         assert sim.way == 0.0
+    with catenary.Simulation(scene.replace(effects={"supercritical_speed": True})) as sim:
+        sim.speed = 128.0
+        assert sim.step()
     with catenary.Simulation(acting("rich_train")) as sim:
         with pytest.raises(catenary.InputError, match="heads of this scene roll or bend"):
             sim.speed = 50.0
