@@ -128,6 +128,7 @@ class _Comparing:
         """Align the force of a pantograph, and compare it."""
         passage, name = self._passage, self._names[own.pantograph]
         run = self._run(own.pantograph)
+        measured = ~np.isnan(own.force)
         force = self._without_gaps(own.force, name)
         if force is None:
             return
@@ -140,7 +141,9 @@ class _Comparing:
             self._find("missing pantograph", name, text + "lowered, or not recorded")
             return
         dt = float(own.place[1] - own.place[0]) / run.speed
-        valid = slice(passage.margin(dt), own.place.size - passage.margin(dt))
+        inside = slice(passage.margin(dt), own.place.size - passage.margin(dt))
+        # Bridges are there for the filter alone: nothing was measured on them.
+        valid = np.arange(own.place.size)[inside][passage.untouched(measured, dt)[inside]]
         place, force = own.place[valid], passage.in_band(force, dt)[valid]
         begin, end = self._stretch(run)
         if begin >= end:
@@ -209,11 +212,14 @@ class _Comparing:
             text = f"{name}: {100 * share:.0f} % of the measured forces are no numbers"
             self._find("missing pantograph", name, text)
             return None
+        known = np.flatnonzero(~missing)
+        # Before the first number and behind the last the record has not begun, or is over.
+        n_gaps = int(missing[known[0] : known[-1]].sum())
+        if n_gaps:
+            text = f"{name}: {n_gaps} samples without a number are left out"
+            self._find("gaps", name, text, float(n_gaps))
         if missing.any():
-            text = f"{name}: {missing.sum()} samples without a number are bridged by straight lines"
-            self._find("gaps", name, text, float(missing.sum()))
-            index = np.arange(values.size)
-            values = np.interp(index, index[~missing], values[~missing])
+            values = np.interp(np.arange(values.size), known, values[known])
         return values
 
     def _aligned(self, place: np.ndarray, force: np.ndarray, number: int) -> Alignment | None:
@@ -264,9 +270,9 @@ class _Comparing:
     # ---- figures --------------------------------------------------------------------------------
 
     def _force_figures(self, name: str, at: np.ndarray, force: np.ndarray, run: RunForce) -> None:
-        """Mean, deviation and extremes of both forces over the same places."""
+        """Mean, deviation and extremes of both forces over the same places, without gaps."""
         filtered = run.below(self._passage.cut_off)(run.position)
-        own = filtered[(run.position >= at[0]) & (run.position <= at[-1])]
+        own = filtered[_near_samples(run.position, at)]
         for label, key, of in (
             ("mean", "mean", np.mean),
             ("standard deviation", "std", np.std),
@@ -298,7 +304,7 @@ class _Comparing:
             )
 
     def _heights(
-        self, own: MeasuredForce, valid: slice, within: np.ndarray, at: np.ndarray, dt: float
+        self, own: MeasuredForce, valid: np.ndarray, within: np.ndarray, at: np.ndarray, dt: float
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Heights of the head, measured and of the run, at the places that are compared."""
         name = self._names[own.pantograph]
@@ -412,3 +418,14 @@ class _Comparing:
         )
         noise = 3.0 * 1e3 * max(scatter, measured.noise)
         self._figure("largest uplift at supports", "", "mm", "uplift", values, 20.0, noise)
+
+
+def _near_samples(position: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Which positions (n,) belong to samples at ascending places (m,), which are even but for
+    gaps: from the first sample to the last those within half a step of one."""
+    half = 0.5 * float(np.median(np.diff(at)))
+    after = np.clip(np.searchsorted(at, position), 1, at.size - 1)
+    distance = np.minimum(np.abs(position - at[after - 1]), np.abs(at[after] - position))
+    # The middle of a step belongs to one sample or the other, whatever the rounding.
+    near = distance <= half * (1.0 + 1e-6)
+    return np.asarray((position >= at[0]) & (position <= at[-1]) & near)
