@@ -426,6 +426,7 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
     assert float(mean[6]) == pytest.approx(float(mean[4]) - float(mean[2]), abs=2e-4)
     by_spans = [line for line in lines if line.endswith(("within chance", "more than chance"))]
     assert len(by_spans) == 4
+    assert all(re.search(r"- A +\S+ +\S+ to +\S+ (within|more than) chance", r) for r in by_spans)
     # The stretch is of whole spans, its last record included: both tables have one difference.
     *_, again = (line for line in by_spans if line.startswith("  pantograph mean"))
     assert float(again.split("C - A")[1].split()[0]) == pytest.approx(float(mean[6]), abs=6e-4)
@@ -449,6 +450,16 @@ def test_part_of_a_span_is_no_sample_of_a_difference(run: Path, tmp_path: Path) 
         file[COMPLETE][...] = [rows, 0, rows]
     assert "differences [N] by the spread" in compare(run, run)
     assert "differences [N] by the spread" not in compare(run, tmp_path)
+
+
+def test_stretches_that_differ_are_told(run: Path, tmp_path: Path) -> None:
+    """Figures of one record over other places are no difference of two lines."""
+    shutil.copy(run / "run.h5", tmp_path)
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        file["line/evaluation_range"][...] = [120.0, 405.0]
+    told = "evaluated are different stretches: A from 120 to 420 m, B from 120 to 405 m"
+    assert told in compare(run, tmp_path).splitlines()
+    assert "different stretches" not in compare(run, run)
 
 
 def test_a_validation_takes_a_comparison_as_its_line_test(
