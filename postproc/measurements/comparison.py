@@ -8,6 +8,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate.span_differences import STATISTICS, differences, span_sums
+from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.measurements.alignment import (
     CERTAIN,
     LEAST_PERIODS,
@@ -129,8 +130,11 @@ class _Comparing:
         passage, name = self._passage, self._names[own.pantograph]
         run = self._run(own.pantograph)
         measured = ~np.isnan(own.force)
-        force = self._without_gaps(own.force, name)
+        force = self._without_gaps(own.force, name, "sample")
         if force is None:
+            share = 100.0 * float(np.mean(~measured))
+            text = f"{name}: {share:.0f} % of the measured forces are no numbers"
+            self._find("missing pantograph", name, text)
             return
         expected = run.below(passage.cut_off)(run.position)
         if other := other_scale(force, expected):
@@ -204,19 +208,18 @@ class _Comparing:
             return None
         return found
 
-    def _without_gaps(self, values: np.ndarray, name: str) -> np.ndarray | None:
-        """Values with gaps bridged by straight lines; None where too much is missing."""
+    def _without_gaps(self, values: np.ndarray, name: str, what: str) -> np.ndarray | None:
+        """Values with gaps bridged by straight lines; None where too much is missing, which is
+        found as gaps of ``what``."""
         missing = np.isnan(values)
         share = float(missing.mean())
         if share > _MOST_GAPS:
-            text = f"{name}: {100 * share:.0f} % of the measured forces are no numbers"
-            self._find("missing pantograph", name, text)
             return None
         known = np.flatnonzero(~missing)
         # Before the first number and behind the last the record has not begun, or is over.
         n_gaps = int(missing[known[0] : known[-1]].sum())
         if n_gaps:
-            text = f"{name}: {n_gaps} samples without a number are left out"
+            text = f"{name}: {counted(n_gaps, what)} without a number, left out"
             self._find("gaps", name, text, float(n_gaps))
         if missing.any():
             values = np.interp(np.arange(values.size), known, values[known])
@@ -310,12 +313,14 @@ class _Comparing:
         name = self._names[own.pantograph]
         if own.head_height is None or not self._results.has("head_height"):
             return None
-        if np.isnan(own.head_height).any():
-            missing = int(np.isnan(own.head_height).sum())
-            text = f"{name}: {missing} head heights are no numbers: heights are not compared"
-            self._find("gaps", name, text, float(missing))
+        known = ~np.isnan(own.head_height)
+        height = self._without_gaps(own.head_height, name, "head height")
+        chosen = self._passage.untouched(known, dt)[valid][within]
+        if height is None or not chosen.any():
+            text = f"{name}: {np.sum(~known)} head heights are no numbers: heights are not compared"
+            self._find("gaps", name, text, float(np.sum(~known)))
             return None
-        measured = self._passage.in_band(own.head_height, dt)[valid][within]
+        measured = np.where(chosen, self._passage.in_band(height, dt)[valid][within], np.nan)
         record = self._results.column("head_height", own.pantograph)
         position = self._run(own.pantograph).position
         return measured, RunForce(position, record, self._results.dt).below(self._passage.cut_off)(
@@ -325,7 +330,10 @@ class _Comparing:
     def _height_figures(
         self, name: str, measured: np.ndarray, run: np.ndarray, own: MeasuredForce, dt: float
     ) -> None:
-        """The range of heights, and an error of their zero beyond the stated bias."""
+        """The range of heights, and an error of their zero beyond the stated bias; where nothing
+        was ``measured`` it is NaN."""
+        known = np.isfinite(measured)
+        measured, run = measured[known], run[known]
         difference = measured - run
         offset, rest = float(difference.mean()), float(difference.std())
         # As for forces: what remains is noise, with its correlation.

@@ -235,6 +235,29 @@ def test_gaps_are_left_out_and_told(run: Path, table: pd.DataFrame, is_filtered:
     check("measured deviation", figures["standard deviation"].measured, own.std(), within=0.3)
 
 
+def test_gaps_of_heights_are_left_out_and_told(run: Path, table: pd.DataFrame) -> None:
+    """A hole at the lowest head beside a force without one: the range is that of the others."""
+    holed = table.copy()
+    place, height = table.place_m.to_numpy(), table.head_height_m.to_numpy()
+    inside = (place >= 120.0) & (place <= 420.0)
+    lowest = int(np.argmin(np.where(inside, height, 9.0)))
+    gap = np.zeros(place.size, dtype=bool)
+    gap[lowest - 30 : lowest + 30] = True
+    holed.loc[gap, "head_height_m"] = np.nan
+    measured = {**PLACES, "head_height": {"column": "head_height_m"}}
+    found = found_in(run, holed, measured=measured)
+    assert [(one.kind, one.value) for one in found.findings] == [("gaps", 60.0)]
+    heights = {one.name: one for one in found.figures}["range of head height"]
+    others = 1e3 * float(np.ptp(height[inside & ~gap]))
+    # One sample more or less at the ends, 0.28 m on slopes of 1 in 1000.
+    assert others < 1e3 * float(np.ptp(height[inside])) - 1.2
+    check("run", heights.run, others, within=0.4)
+    check("measured", heights.measured, others, within=0.4)
+    holed.loc[: len(holed), "head_height_m"] = np.nan
+    found = found_in(run, holed, measured=measured)
+    assert "heights are not compared" in found.findings[0].text
+
+
 def test_places_that_count_against_the_train_are_turned(run: Path, table: pd.DataFrame) -> None:
     """Kilometre posts that fall from 12.3 km at the begin of the line."""
     posts = table.assign(post=12.3 - 1e-3 * table.place_m)
