@@ -97,6 +97,12 @@ def _heads(runs: Sequence[Results]) -> list[str]:
         if alone:
             only = "only " if len(runs) == 2 else ""
             lines.append(f"{only}{letter} simulates {', '.join(sorted(alone))}")
+    if not np.allclose([run.evaluation for run in runs], runs[0].evaluation, rtol=0.0, atol=1e-6):
+        stretches = ", ".join(
+            f"{letter} from {run.evaluation[0]:g} to {run.evaluation[1]:g} m"
+            for letter, run in zip(ascii_uppercase, runs, strict=False)
+        )
+        lines.append(f"evaluated are different stretches: {stretches}")
     return lines
 
 
@@ -201,7 +207,7 @@ def _by_spans(runs: Sequence[Results]) -> list[str]:
             found = differences(first, other, paired)
             for label, one in zip(STATISTICS, found or (), strict=False):
                 mark = "more than chance" if one.is_certain else "within chance"
-                figures = f"{one.value:8.3f}{one.low:8.3f} to{one.high:7.3f} {mark}"
+                figures = f"{one.value:8.3f}{one.low:9.3f} to {one.high:8.3f} {mark}"
                 rows.append((f"{name} {label}", f" {letter} - A{figures}"))
     if not rows:
         return []

@@ -65,7 +65,8 @@ class Overlay:
     pantograph : its name
     place : (n,) of the measured samples on the run's line [m]
     measured, run : (n,) forces below the cut-off [N]
-    measured_height, run_height : (n,) heights of the head likewise [m], None if not measured
+    measured_height, run_height : (n,) heights of the head likewise [m], NaN in gaps of the
+        measured ones, None if not measured
     alignment : None if it could not be aligned
     """
 

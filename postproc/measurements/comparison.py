@@ -8,6 +8,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate.span_differences import STATISTICS, differences, span_sums
+from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.measurements.alignment import (
     CERTAIN,
     LEAST_PERIODS,
@@ -128,8 +129,12 @@ class _Comparing:
         """Align the force of a pantograph, and compare it."""
         passage, name = self._passage, self._names[own.pantograph]
         run = self._run(own.pantograph)
-        force = self._without_gaps(own.force, name)
+        measured = ~np.isnan(own.force)
+        force = self._without_gaps(own.force, name, "sample")
         if force is None:
+            share = 100.0 * float(np.mean(~measured))
+            text = f"{name}: {share:.0f} % of the measured forces are no numbers"
+            self._find("missing pantograph", name, text)
             return
         expected = run.below(passage.cut_off)(run.position)
         if other := other_scale(force, expected):
@@ -140,7 +145,9 @@ class _Comparing:
             self._find("missing pantograph", name, text + "lowered, or not recorded")
             return
         dt = float(own.place[1] - own.place[0]) / run.speed
-        valid = slice(passage.margin(dt), own.place.size - passage.margin(dt))
+        inside = slice(passage.margin(dt), own.place.size - passage.margin(dt))
+        # Bridges are there for the filter alone: nothing was measured on them.
+        valid = np.arange(own.place.size)[inside][passage.untouched(measured, dt)[inside]]
         place, force = own.place[valid], passage.in_band(force, dt)[valid]
         begin, end = self._stretch(run)
         if begin >= end:
@@ -201,19 +208,21 @@ class _Comparing:
             return None
         return found
 
-    def _without_gaps(self, values: np.ndarray, name: str) -> np.ndarray | None:
-        """Values with gaps bridged by straight lines; None where too much is missing."""
+    def _without_gaps(self, values: np.ndarray, name: str, what: str) -> np.ndarray | None:
+        """Values with gaps bridged by straight lines; None where too much is missing, which is
+        found as gaps of ``what``."""
         missing = np.isnan(values)
         share = float(missing.mean())
         if share > _MOST_GAPS:
-            text = f"{name}: {100 * share:.0f} % of the measured forces are no numbers"
-            self._find("missing pantograph", name, text)
             return None
+        known = np.flatnonzero(~missing)
+        # Before the first number and behind the last the record has not begun, or is over.
+        n_gaps = int(missing[known[0] : known[-1]].sum())
+        if n_gaps:
+            text = f"{name}: {counted(n_gaps, what)} without a number, left out"
+            self._find("gaps", name, text, float(n_gaps))
         if missing.any():
-            text = f"{name}: {missing.sum()} samples without a number are bridged by straight lines"
-            self._find("gaps", name, text, float(missing.sum()))
-            index = np.arange(values.size)
-            values = np.interp(index, index[~missing], values[~missing])
+            values = np.interp(np.arange(values.size), known, values[known])
         return values
 
     def _aligned(self, place: np.ndarray, force: np.ndarray, number: int) -> Alignment | None:
@@ -264,9 +273,9 @@ class _Comparing:
     # ---- figures --------------------------------------------------------------------------------
 
     def _force_figures(self, name: str, at: np.ndarray, force: np.ndarray, run: RunForce) -> None:
-        """Mean, deviation and extremes of both forces over the same places."""
+        """Mean, deviation and extremes of both forces over the same places, without gaps."""
         filtered = run.below(self._passage.cut_off)(run.position)
-        own = filtered[(run.position >= at[0]) & (run.position <= at[-1])]
+        own = filtered[_near_samples(run.position, at)]
         for label, key, of in (
             ("mean", "mean", np.mean),
             ("standard deviation", "std", np.std),
@@ -298,18 +307,20 @@ class _Comparing:
             )
 
     def _heights(
-        self, own: MeasuredForce, valid: slice, within: np.ndarray, at: np.ndarray, dt: float
+        self, own: MeasuredForce, valid: np.ndarray, within: np.ndarray, at: np.ndarray, dt: float
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Heights of the head, measured and of the run, at the places that are compared."""
         name = self._names[own.pantograph]
         if own.head_height is None or not self._results.has("head_height"):
             return None
-        if np.isnan(own.head_height).any():
-            missing = int(np.isnan(own.head_height).sum())
-            text = f"{name}: {missing} head heights are no numbers: heights are not compared"
-            self._find("gaps", name, text, float(missing))
+        known = ~np.isnan(own.head_height)
+        height = self._without_gaps(own.head_height, name, "head height")
+        chosen = self._passage.untouched(known, dt)[valid][within]
+        if height is None or not chosen.any():
+            text = f"{name}: {np.sum(~known)} head heights are no numbers: heights are not compared"
+            self._find("gaps", name, text, float(np.sum(~known)))
             return None
-        measured = self._passage.in_band(own.head_height, dt)[valid][within]
+        measured = np.where(chosen, self._passage.in_band(height, dt)[valid][within], np.nan)
         record = self._results.column("head_height", own.pantograph)
         position = self._run(own.pantograph).position
         return measured, RunForce(position, record, self._results.dt).below(self._passage.cut_off)(
@@ -319,7 +330,10 @@ class _Comparing:
     def _height_figures(
         self, name: str, measured: np.ndarray, run: np.ndarray, own: MeasuredForce, dt: float
     ) -> None:
-        """The range of heights, and an error of their zero beyond the stated bias."""
+        """The range of heights, and an error of their zero beyond the stated bias; where nothing
+        was ``measured`` it is NaN."""
+        known = np.isfinite(measured)
+        measured, run = measured[known], run[known]
         difference = measured - run
         offset, rest = float(difference.mean()), float(difference.std())
         # As for forces: what remains is noise, with its correlation.
@@ -412,3 +426,14 @@ class _Comparing:
         )
         noise = 3.0 * 1e3 * max(scatter, measured.noise)
         self._figure("largest uplift at supports", "", "mm", "uplift", values, 20.0, noise)
+
+
+def _near_samples(position: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Which positions (n,) belong to samples at ascending places (m,), which are even but for
+    gaps: from the first sample to the last those within half a step of one."""
+    half = 0.5 * float(np.median(np.diff(at)))
+    after = np.clip(np.searchsorted(at, position), 1, at.size - 1)
+    distance = np.minimum(np.abs(position - at[after - 1]), np.abs(at[after] - position))
+    # The middle of a step belongs to one sample or the other, whatever the rounding.
+    near = distance <= half * (1.0 + 1e-6)
+    return np.asarray((position >= at[0]) & (position <= at[-1]) & near)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import binary_dilation, binary_opening
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
@@ -106,6 +107,17 @@ class Passage:
     def margin(self, dt: float) -> int:
         """Samples at either end of a record that the filter has spoiled."""
         return 0 if self.is_filtered else int(np.ceil(SETTLED / (self.cut_off * dt)))
+
+    def untouched(self, measured: np.ndarray, dt: float) -> np.ndarray:
+        """Which samples (n,), ``dt`` [s] apart, are not spoiled by gaps, where ``measured`` (n,) is
+        false."""
+        if self.is_filtered:
+            return measured
+        period = 1.0 / (self.cut_off * dt)
+        # Within a quarter of the shortest wave a straight line follows it, and a longer one is
+        # felt by the filter a wave beyond its ends.
+        long = binary_opening(~measured, np.ones(int(0.25 * period) + 1))
+        return measured & ~binary_dilation(long, iterations=int(np.ceil(period)))
 
 
 class RunForce:

@@ -370,6 +370,17 @@ def test_gaps_and_holes_are_told() -> None:
     still.loc[500, "x"] = still.x[499]
     with pytest.raises(InputError, match="from row 500 to row 501 .* goes on by 0 m"):
         measurement(still)
+    # Each step is within 1.6 % of the usual one, and samples are up to 0.5 m from even steps.
+    varying = samples()
+    varying["x"] += 0.5 * np.sin(2.0 * np.pi * np.arange(len(varying)) / len(varying))
+    with pytest.raises(InputError, match="even steps from the first row to the last lead to"):
+        measurement(varying)
+    # Whole centimetres are even steps: of 0.2003 m some are 0.20 m and some 0.21 m.
+    rounded = samples()
+    rounded["x"] = 100.0 + 1.0015 * (rounded.x - 100.0)
+    exact = measurement(rounded, to_m=250.0).place
+    cut = measurement(rounded.round({"x": 2}), to_m=250.0).place
+    np.testing.assert_allclose(cut, exact, atol=0.01)
     holed = samples().astype({"F": object})
     for cell, said in ((np.nan, "no number"), ("n/a", '"n/a"')):
         holed.loc[7, "F"] = cell

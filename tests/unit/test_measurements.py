@@ -196,11 +196,66 @@ def test_a_lowered_pantograph_has_no_other_unit(run: Path, table: pd.DataFrame) 
     assert [one.kind for one in found.findings] == ["missing pantograph"]
 
 
-def test_gaps_are_bridged_and_told(run: Path, table: pd.DataFrame) -> None:
+@pytest.mark.parametrize("is_filtered", [True, False])
+def test_gaps_are_left_out_and_told(run: Path, table: pd.DataFrame, is_filtered: bool) -> None:
+    """A hole of 14 m at a span's highest forces, and single cells: figures of both are those of
+    the other samples, and what remains is the noise alone."""
     holed = table.copy()
-    holed.iloc[300:310, 1] = np.nan
-    found = found_in(run, holed)
-    assert [(one.kind, one.value) for one in found.findings] == [("gaps", 10.0)]
+    if not is_filtered:
+        with Results(run) as results:
+            holed.force_N = results.column("contact_force", 0)[::2]
+    place, force = holed.place_m.to_numpy(), holed.force_N.to_numpy(copy=True)
+    highest = int(np.argmax(np.where((place > 200.0) & (place < 350.0), force, 0.0)))
+    gap = np.zeros(place.size, dtype=bool)
+    gap[highest - 25 : highest + 25] = gap[[900, 905, 1010]] = True
+    holed.loc[gap, "force_N"] = np.nan
+    holed.iloc[:10, 1] = holed.iloc[-10:, 1] = np.nan  # outside of the stretch, and no gaps
+    found = found_in(run, holed, measured={**PLACES, "is_filtered": is_filtered})
+    assert [(one.kind, one.value) for one in found.findings] == [("gaps", float(gap.sum()))]
+    alignment = found.overlays[0].alignment
+    assert alignment is not None
+    at = found.overlays[0].place
+    inside = (place >= 120.0) & (place <= 420.0) & ~gap
+    if is_filtered:
+        assert alignment.residual < 1.1 * 2.0  # of the noise; straight lines left 5 N
+        assert abs(at.size - np.count_nonzero(inside)) <= 2  # at the ends, by the shift found
+    else:  # single cells of 4 ms are bridged for the filter, with a newton or less
+        assert alignment.residual < 1.0
+        # A wave of 20 Hz, 3.5 m, beyond the ends of the hole is left out, too.
+        beyond = np.abs(at - place[highest])
+        assert beyond.min() > 25 * (place[1] - place[0]) + 3.0
+    figures = {one.name: one for one in found.figures}
+    with Results(run) as results:
+        raw, position = results.column("contact_force", 0), results.column("contact_position", 0)
+    whole = signal.sosfiltfilt(signal.butter(6, 20.0, fs=500.0, output="sos"), raw, padlen=150)
+    own = np.interp(at, position, whole)
+    # Of 700 samples with 2 N the mean has 0.08 N, the deviation 0.06 N; at twice their spacing.
+    check("mean", figures["mean"].run, own.mean(), within=0.1)
+    check("measured mean", figures["mean"].measured, own.mean(), within=0.3)
+    check("measured deviation", figures["standard deviation"].measured, own.std(), within=0.3)
+
+
+def test_gaps_of_heights_are_left_out_and_told(run: Path, table: pd.DataFrame) -> None:
+    """A hole at the lowest head beside a force without one: the range is that of the others."""
+    holed = table.copy()
+    place, height = table.place_m.to_numpy(), table.head_height_m.to_numpy()
+    inside = (place >= 120.0) & (place <= 420.0)
+    lowest = int(np.argmin(np.where(inside, height, 9.0)))
+    gap = np.zeros(place.size, dtype=bool)
+    gap[lowest - 30 : lowest + 30] = True
+    holed.loc[gap, "head_height_m"] = np.nan
+    measured = {**PLACES, "head_height": {"column": "head_height_m"}}
+    found = found_in(run, holed, measured=measured)
+    assert [(one.kind, one.value) for one in found.findings] == [("gaps", 60.0)]
+    heights = {one.name: one for one in found.figures}["range of head height"]
+    others = 1e3 * float(np.ptp(height[inside & ~gap]))
+    # One sample more or less at the ends, 0.28 m on slopes of 1 in 1000.
+    assert others < 1e3 * float(np.ptp(height[inside])) - 1.2
+    check("run", heights.run, others, within=0.4)
+    check("measured", heights.measured, others, within=0.4)
+    holed.loc[: len(holed), "head_height_m"] = np.nan
+    found = found_in(run, holed, measured=measured)
+    assert "heights are not compared" in found.findings[0].text
 
 
 def test_places_that_count_against_the_train_are_turned(run: Path, table: pd.DataFrame) -> None:
@@ -394,6 +449,7 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
     assert float(mean[6]) == pytest.approx(float(mean[4]) - float(mean[2]), abs=2e-4)
     by_spans = [line for line in lines if line.endswith(("within chance", "more than chance"))]
     assert len(by_spans) == 4
+    assert all(re.search(r"- A +\S+ +\S+ to +\S+ (within|more than) chance", r) for r in by_spans)
     # The stretch is of whole spans, its last record included: both tables have one difference.
     *_, again = (line for line in by_spans if line.startswith("  pantograph mean"))
     assert float(again.split("C - A")[1].split()[0]) == pytest.approx(float(mean[6]), abs=6e-4)
@@ -417,6 +473,16 @@ def test_part_of_a_span_is_no_sample_of_a_difference(run: Path, tmp_path: Path) 
         file[COMPLETE][...] = [rows, 0, rows]
     assert "differences [N] by the spread" in compare(run, run)
     assert "differences [N] by the spread" not in compare(run, tmp_path)
+
+
+def test_stretches_that_differ_are_told(run: Path, tmp_path: Path) -> None:
+    """Figures of one record over other places are no difference of two lines."""
+    shutil.copy(run / "run.h5", tmp_path)
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        file["line/evaluation_range"][...] = [120.0, 405.0]
+    told = "evaluated are different stretches: A from 120 to 420 m, B from 120 to 405 m"
+    assert told in compare(run, tmp_path).splitlines()
+    assert "different stretches" not in compare(run, run)
 
 
 def test_a_validation_takes_a_comparison_as_its_line_test(

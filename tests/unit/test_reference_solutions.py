@@ -244,6 +244,7 @@ def stretch(force: str) -> str:
         (stretch("0.15"), ONE, "gives 0.15 for mean_N of pantograph, where ac_simple_275_one has"),
         ("place_m,pantograph_N\n" + 20 * "1,2\n", ONE, "equidistant samples in ascending order"),
         (rows(1.0), ONE, "covers 1.0 to 20.0 m"),
+        (rows(-1.0), ONE, "rows must stand in the order of the passage$"),
         ("place_m,pantograph_N\n", ONE, "has 0 rows; at least 20 are needed"),
         (rows(2000.0), ONE, "has a sample every 2e.03 m"),
         (

@@ -22,8 +22,9 @@ from catenary.postproc.measurements.passage import MeasuredForce, MeasuredUplift
 from catenary.postproc.read.results import Results
 
 LEAST_SAMPLES = 20
-# Samples are equidistant if their spacings differ by less than this part.
-_EVEN = 0.02
+# Samples are equidistant if none is further from even steps than this part of a step. Places in
+# whole centimetres may be up to one off, as far as this is at most the second part.
+_EVEN, _CENTIMETRE, _ROUNDED = 0.05, 0.0101, 0.1
 
 
 def read_table(path: Path) -> pd.DataFrame:
@@ -120,13 +121,14 @@ def places_of(
     return evened_out(places, path)
 
 
-def evened_out(places: np.ndarray, path: str) -> np.ndarray:
+def evened_out(places: np.ndarray, path: str, is_described: bool = True) -> np.ndarray:
     """Places (n,) at equal distances [m], from rounded ``places`` (n,).
 
     Parameters
     ----------
     places : as the file has them [m]
     path : name of the table in sentences
+    is_described : whether a description may say that places count against the train
 
     Raises
     ------
@@ -139,12 +141,22 @@ def evened_out(places: np.ndarray, path: str) -> np.ndarray:
     spacing, spacings = even[1] - even[0], np.diff(places)
     usual = float(np.median(spacings))
     if usual < 0.0:
+        hint = "; place.direction in a description says whether places count with the train or "
         raise InputError(
             f"{path} has places that fall along the line, from {places[0]:.1f} to {places[-1]:.1f} "
-            "m: rows must stand in the order of the passage; place.direction in a description says "
-            "whether places count with the train or against it"
+            "m: rows must stand in the order of the passage"
+            + (f"{hint}against it" if is_described else "")
         )
-    if spacing <= 0.0 or np.abs(spacings - spacing).max() > _EVEN * spacing + 1e-4:
+    # Small differences of spacings add up where the speed varies.
+    off = np.abs(places - even)
+    if spacing <= 0.0 or off.max() > max(_EVEN * spacing, min(_CENTIMETRE, _ROUNDED * spacing)):
+        if spacing > 0.0 and np.abs(spacings - usual).max() < 0.5 * usual:
+            row = int(off.argmax())
+            raise InputError(
+                f"{path} must have equidistant samples: row {row + 1} below its names is at "
+                f"{places[row]:.2f} m, and even steps from the first row to the last lead to "
+                f"{even[row]:.2f} m; resample it at even steps of place or time"
+            )
         row = int(np.abs(spacings - usual).argmax()) + 2
         raise InputError(
             f"{path} must have equidistant samples in ascending order: from row {row - 1} to row "

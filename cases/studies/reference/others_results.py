@@ -199,7 +199,7 @@ def _places_of(one: Others, of: str, table: pd.DataFrame, name: str) -> tuple[np
     stated = (
         by_time if by_time is not None and PLACE not in table else column_of(table, name, PLACE)
     )
-    place = evened_out(stated, name)
+    place = evened_out(stated, name, is_described=False)
     spacing = place[1] - place[0]
     off = 0.0 if by_time is None else float(np.abs(by_time - stated).max())
     if off > spacing:
