@@ -240,7 +240,7 @@ def animate(
     console.say(f"{film.n_pictures} pictures; the film runs {pace} than the train.")
     if film.left_out:
         console.warn(
-            f"the film leaves out {film.left_out} snapshots that do not show the line where the "
+            f"the film leaves out {film.left_out} snapshots that do not show the line around the "
             "train is; output.field_spans chooses what they show"
         )
     if not film.smooth:

@@ -53,7 +53,7 @@ class Film:
     slowed : how many times slower than the train it runs
     apart : travel of the train between two snapshots [m]
     smooth : whether there are pictures between snapshots, or these are not too far apart
-    left_out : snapshots left out, as they do not show the line where the train is
+    left_out : snapshots left out, as they do not show the line around the train
     """
 
     files: tuple[Path, Path]
@@ -187,7 +187,7 @@ class Pictures:
     ----------
     times : of the pictures [s]
     drawing : on which they are drawn
-    left_out : snapshots of the time asked for that do not show the line where the train is
+    left_out : snapshots of the time asked for that do not show the line around the train
 
     Raises
     ------
@@ -202,7 +202,7 @@ class Pictures:
         data = scenery.data
         self._followed = followed(data, options.camera)
         asked = chosen(snapshots.times, options)
-        usual = _WIDTH + 1.1 * float(np.ptp(data.position[0, self._followed]))
+        usual = self._usual(asked)
         numbers = self._with_line(asked, options.width or usual)
         self.left_out = asked.size - numbers.size
         shown = snapshots.times[numbers]
@@ -268,10 +268,25 @@ class Pictures:
         inside = (x >= low) & (x <= high)
         return inside if inside.any() else np.ones_like(inside)
 
+    def _usual(self, asked: np.ndarray) -> float:
+        """Length of line that pictures show if none is wanted: of a stretch at most its half, so
+        that the train passes through whole pictures."""
+        usual = _WIDTH + 1.1 * float(np.ptp(self._scenery.data.position[0, self._followed]))
+        return min(usual, 0.5 * self._stretch(asked))
+
+    def _stretch(self, asked: np.ndarray) -> float:
+        """Length of the part of the line that all snapshots show, infinite of the whole line and of
+        a window that moves [m]."""
+        data = self._scenery.data
+        x = data.points[data.wires[data.contact], 0]
+        first, last = (self._snapshots.shown(int(number)) for number in asked[[0, -1]])
+        whole = first[0] <= x[0] + _NEAR and first[1] >= x[-1] - _NEAR
+        return np.inf if whole or first != last else first[1] - first[0]
+
     def _with_line(self, asked: np.ndarray, width: float) -> np.ndarray:
         """Those of the snapshots ``asked`` for that show the line at the train: all of a window
-        that moves with it. Of a stretch that it enters or leaves those that fill a picture of a
-        ``width``, where there are two."""
+        that moves with it. Of a stretch those that fill a picture of a ``width``, where there are
+        two."""
         fitting: list[int] = []
         there: list[int] = []
         for number in asked.tolist():
@@ -288,7 +303,8 @@ class Pictures:
                 f"the first shows it from {begin:.0f} to {end:.0f} m; film another time, or run "
                 "the scene again with other output.field_spans"
             )
-        return np.array(fitting if len(there) < asked.size and len(fitting) > 1 else there)
+        fixed = np.isfinite(self._stretch(asked))
+        return np.array(fitting if fixed and len(fitting) > 1 else there)
 
     def _row(self, number: int) -> int:
         """The record nearest to a snapshot."""

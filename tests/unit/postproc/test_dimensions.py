@@ -78,6 +78,8 @@ def test_each_table_that_is_shown_has_its_unit(tables: dict[str, h5py.Dataset]) 
     for path, table in tables.items():
         if not is_size(table) and not path.startswith(("checkpoint/", "extremes/")):
             assert table.attrs["units"] and table.attrs["long_name"], path
+            # Meanings that begin with "how far" follow no article.
+            assert "the how" not in str(table.attrs["long_name"]), path
     assert tables["channels/contact_force"].attrs["units"] == b"N"
     assert tables["static/elasticity"].attrs["units"] == b"m/N"
     assert (

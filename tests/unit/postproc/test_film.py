@@ -319,9 +319,10 @@ def test_a_film_of_a_stretch_is_of_the_time_when_the_train_is_there(
     )
     record_run(tmp_path / "run.h5", march)
     with pictures_of(tmp_path, FilmOptions()) as pictures:
-        # A node beside each end is shown, too.
-        assert 0.35 <= pictures.times[0] and pictures.times[-1] <= 0.95
-        assert 0.4 <= pictures.times[-1] - pictures.times[0]
+        # Half the stretch fills a picture, 0.55 of which is behind the train; with 50 ms between
+        # snapshots, and 3 m by which a picture may reach beyond them.
+        assert 0.4 + 0.275 * 0.5 - 0.09 <= pictures.times[0] <= 0.4 + 0.275 * 0.5 + 0.05
+        assert 0.9 - 0.225 * 0.5 - 0.05 <= pictures.times[-1] <= 0.9 - 0.225 * 0.5 + 0.09
         assert pictures.left_out + len(pictures) == 21
         for time in pictures.times.tolist():
             pictures.show(time)
