@@ -238,6 +238,11 @@ def animate(
     )
     console.say("\n".join(map(str, film.files)))
     console.say(f"{film.n_pictures} pictures; the film runs {pace} than the train.")
+    if film.left_out:
+        console.warn(
+            f"the film leaves out {film.left_out} snapshots that do not show the line around the "
+            "train is; output.field_spans chooses what they show"
+        )
     if not film.smooth:
         console.warn(
             f"snapshots are {film.apart:.2g} m apart, and each is a picture; for a smooth film "

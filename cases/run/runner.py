@@ -385,7 +385,9 @@ def _observers(
         fields = FieldRecorder(
             comm,
             order.out_dir / "fields.xdmf",
-            RecordedLine(problem.line, at_rest.mesh, at_rest.form.slope, at_rest.form.lateral),
+            RecordedLine(
+                at_rest.problem.line, at_rest.mesh, at_rest.form.slope, at_rest.form.lateral
+            ),
             every=recording.field_every,
             record=recording.fields,
             flush_every=flush_every,

@@ -83,7 +83,7 @@ def describe_extremes(file: h5py.File, dataset: h5d.DatasetID, name: str) -> Non
     """Name the dimensions of a new table (2, columns) of the extremes of a channel."""
     channel = _channel(name)
     _attach(file, dataset, ("smallest_largest", ALL_COLUMNS[channel.per]))
-    _describe(dataset, channel.unit, f"extremes of the {channel.meaning}")
+    _describe(dataset, channel.unit, f"smallest and largest of all steps: {channel.meaning}")
 
 
 def describe_filtered(dataset: h5py.Dataset) -> None:

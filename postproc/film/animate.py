@@ -53,6 +53,7 @@ class Film:
     slowed : how many times slower than the train it runs
     apart : travel of the train between two snapshots [m]
     smooth : whether there are pictures between snapshots, or these are not too far apart
+    left_out : snapshots left out, as they do not show the line around the train
     """
 
     files: tuple[Path, Path]
@@ -60,6 +61,7 @@ class Film:
     slowed: float
     apart: float
     smooth: bool
+    left_out: int
 
 
 def animate(
@@ -114,7 +116,8 @@ def animate(
             count = video.write(shown, drawing.SIZE, options.rate, *files, colours)
             seconds = float(np.diff(made.times).mean())
             apart = data.speed * float(np.diff(snapshots.times).mean())
-    return Film(files, count, 1.0 / (seconds * options.rate), apart, apart <= SMOOTH_UP_TO)
+    slowed = 1.0 / (seconds * options.rate)
+    return Film(files, count, slowed, apart, apart <= SMOOTH_UP_TO, made.left_out)
 
 
 def chosen(times: np.ndarray, options: FilmOptions) -> np.ndarray:
@@ -184,6 +187,7 @@ class Pictures:
     ----------
     times : of the pictures [s]
     drawing : on which they are drawn
+    left_out : snapshots of the time asked for that do not show the line around the train
 
     Raises
     ------
@@ -197,10 +201,13 @@ class Pictures:
         self._results, self._scenery, self._snapshots = results, scenery, snapshots
         data = scenery.data
         self._followed = followed(data, options.camera)
-        numbers = chosen(snapshots.times, options)
+        asked = chosen(snapshots.times, options)
+        usual = self._usual(asked)
+        numbers = self._with_line(asked, options.width or usual)
+        self.left_out = asked.size - numbers.size
         shown = snapshots.times[numbers]
         view = options.view or scenery.best_view
-        self._width = width = self._fitting(numbers, options.width)
+        self._width = width = self._fitting(numbers, options.width, usual)
         every = options.every or _TRAVEL * width
         self.times = times_of_pictures(shown, data.speed, every)
         picture = Picture.of(view, data, scenery.roof, width, drawing.ASPECT)
@@ -251,36 +258,84 @@ class Pictures:
 
     def _span(self, row: int, width: float) -> tuple[float, float]:
         """Line in a picture of a width, from and to [m]."""
-        middle = float(self._scenery.data.position[row, self._followed].mean())
+        middle = self._middle(row)
         return middle - _BEHIND * width, middle + (1.0 - _BEHIND) * width
 
     def _seen(self, number: int) -> np.ndarray:
         """Mask (n_nodes,) of nodes that a picture shows at a snapshot, all where it shows none."""
-        data = self._scenery.data
-        row = data.row_at(float(self._snapshots.times[number]))
-        low, high = self._span(row, self._width)
-        x = data.points[:, 0]
+        low, high = self._span(self._row(number), self._width)
+        x = self._scenery.data.points[:, 0]
         inside = (x >= low) & (x <= high)
         return inside if inside.any() else np.ones_like(inside)
 
-    def _fitting(self, numbers: np.ndarray, wanted: float | None) -> float:
-        """Length of line that pictures show: what is wanted, or less where snapshots have less."""
-        data, snapshots = self._scenery.data, self._snapshots
-        width = wanted or _WIDTH + 1.1 * float(np.ptp(data.position[0, self._followed]))
+    def _usual(self, asked: np.ndarray) -> float:
+        """Length of line that pictures show if none is wanted: of a stretch at most its half, so
+        that the train passes through whole pictures."""
+        usual = _WIDTH + 1.1 * float(np.ptp(self._scenery.data.position[0, self._followed]))
+        return min(usual, 0.5 * self._stretch(asked))
+
+    def _stretch(self, asked: np.ndarray) -> float:
+        """Length of the part of the line that all snapshots show, infinite of the whole line and of
+        a window that moves [m]."""
+        data = self._scenery.data
         x = data.points[data.wires[data.contact], 0]
+        first, last = (self._snapshots.shown(int(number)) for number in asked[[0, -1]])
+        whole = first[0] <= x[0] + _NEAR and first[1] >= x[-1] - _NEAR
+        return np.inf if whole or first != last else first[1] - first[0]
+
+    def _with_line(self, asked: np.ndarray, width: float) -> np.ndarray:
+        """Those of the snapshots ``asked`` for that show the line at the train: all of a window
+        that moves with it. Of a stretch those that fill a picture of a ``width``, where there are
+        two."""
+        fitting: list[int] = []
+        there: list[int] = []
+        for number in asked.tolist():
+            (low, high), (begin, end) = self._ends(number, width), self._snapshots.shown(number)
+            if begin <= low + _NEAR and end >= high - _NEAR:
+                fitting.append(number)
+            if begin <= self._middle(self._row(number)) <= end:
+                there.append(number)
+        if max(len(fitting), len(there)) < 2:
+            begin, end = self._snapshots.shown(int(asked[0]))
+            first, last = (self._snapshots.times[number] for number in asked[[0, -1]])
+            raise InputError(
+                f"from {first:g} to {last:g} s no two snapshots show the line where the train is; "
+                f"the first shows it from {begin:.0f} to {end:.0f} m; film another time, or run "
+                "the scene again with other output.field_spans"
+            )
+        fixed = np.isfinite(self._stretch(asked))
+        return np.array(fitting if fixed and len(fitting) > 1 else there)
+
+    def _row(self, number: int) -> int:
+        """The record nearest to a snapshot."""
+        return self._scenery.data.row_at(float(self._snapshots.times[number]))
+
+    def _ends(self, number: int, width: float) -> np.ndarray:
+        """Line in a picture of a width at a snapshot, from and to, as far as it goes [m]."""
+        data = self._scenery.data
+        x = data.points[data.wires[data.contact], 0]
+        return np.clip(self._span(self._row(number), width), x[0], x[-1])
+
+    def _middle(self, row: int) -> float:
+        """Place that the camera looks at in a record [m]."""
+        return float(self._scenery.data.position[row, self._followed].mean())
+
+    def _fitting(self, numbers: np.ndarray, wanted: float | None, usual: float) -> float:
+        """Length of line that pictures show: what is wanted, or less than is ``usual`` where
+        snapshots have less."""
+        snapshots, width = self._snapshots, wanted or usual
         for number in numbers[[0, numbers.size // 2, -1]].tolist():
-            time = float(snapshots.times[number])
-            row = data.row_at(time)
-            low, high = np.clip(self._span(row, width), x[0], x[-1])
-            middle = float(data.position[row, self._followed].mean())
+            low, high = self._ends(number, width)
+            middle = self._middle(self._row(number))
             begin, end = snapshots.shown(number)
             if begin <= low + _NEAR and end >= high - _NEAR:
                 continue
             if wanted is not None:
                 raise InputError(
                     f"a picture of {width:g} m shows the line from {low:.0f} to {high:.0f} m at "
-                    f"t = {time:g} s, and the snapshots have it from {begin:.0f} to {end:.0f} m "
-                    "only; take a smaller --width-m, or a larger output.field_window_m"
+                    f"t = {snapshots.times[number]:g} s, and the snapshots have it from "
+                    f"{begin:.0f} to {end:.0f} m only; take a smaller --width-m, or a larger "
+                    "output.field_window_m"
                 )
             if begin > low + _NEAR:
                 width = min(width, (middle - begin) / _BEHIND)

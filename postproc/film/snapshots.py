@@ -100,7 +100,8 @@ class Snapshots:
     Raises
     ------
     InputError
-        If the folder has no snapshots, or damaged ones, those of another line or without uplift.
+        If the folder has no snapshots, or damaged ones, those of another line or without wires or
+        uplift.
     """
 
     def __init__(self, folder: Path, n_nodes: int, until: float = np.inf) -> None:
@@ -141,6 +142,11 @@ class Snapshots:
         self._of_this_line = tables.n_nodes == self._n_nodes
         self._blocks, self._sizes = tables.blocks, tables.n_places
         wires = [name for name in self.parts if name not in OTHER_PARTS]
+        if not wires:
+            raise InputError(
+                f"{path} shows no wire of the line; run the scene again with wires in "
+                "output.field_parts"
+            )
         if not all({"uplift", "displacement"} & set(file[name]) for name in wires):
             raise InputError(
                 f"{path} has neither uplift nor displacement; run the scene again with one of "

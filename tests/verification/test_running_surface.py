@@ -10,7 +10,7 @@ from catenary.mbs.vehicle.irregularity import N_WAVES
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.defects import Kink
+from catenary.solver.problem.defects import Kink, WornWire
 from catenary.solver.problem.irregularities import (
     BentWire,
     Heights,
@@ -85,6 +85,26 @@ def test_the_surface_is_what_was_wanted_at_every_place() -> None:
     apart = np.abs(x - 30.0) > 1e-5
     steep = wires.rest_slope(x) - smooth.rest_slope(x)
     check("slope [-]", steep[apart], sum(p[1] for p in parts)[apart], within=2e-5)
+
+
+def test_a_kink_of_a_worn_wire_straightens_over_less() -> None:
+    """Its depth is angle / 2 sqrt(EI / F) of what is left: of 30 % lost from below 0.34 of EI."""
+    worn = WornWire(CONTACT_WIRE, 25.0, 35.0, 0.3)
+    effects = WAVY | {"worn_wire"}
+    kink = Kink(CONTACT_WIRE, 30.0, 0.02)
+    depth = []
+    for others in ((), (worn,)):
+        heights = []
+        for defects in (others, (*others, kink)):
+            problem = problem_of(bare_wires(60.0), effects, defects=defects)
+            model, form = find_form(problem, mesh_of(problem.line, 60))
+            wires = ContactWires(model, form, distribute(model, 1, 0))
+            heights.append(wires.rest_height(np.array([30.0]))[0])
+        depth.append(heights[0] - heights[1])
+    length = np.sqrt(195.0 / 20e3)
+    check("depth of a sound wire [m]", depth[0], 0.01 * length, within=1e-7)
+    # 0.34065 by summing a disc in strips; samples of the surface are good for 1e-7 m.
+    check("depth of a worn wire [m]", depth[1], 0.01 * length * np.sqrt(0.34065), within=2e-7)
 
 
 def test_random_heights_have_the_spectrum_wanted() -> None:

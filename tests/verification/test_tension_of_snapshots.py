@@ -18,7 +18,9 @@ from catenary.postproc.record.snapshots.field_kinds import ALONG as U
 from catenary.postproc.record.snapshots.field_kinds import ASIDE, KINDS, SLOPE, TURN, UP
 from catenary.postproc.record.snapshots.field_layout import FieldRecord, layout_of
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
+from catenary.solver.effects.all_effects import with_defects
 from catenary.solver.model.axial_elements import strain_rows, unknowns_along
+from catenary.solver.problem.defects import WornWire
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 
@@ -33,18 +35,32 @@ def staggered() -> LineData:
     )
 
 
+# A stretch that begins and ends within elements, and what it has lost.
+WORN, LOST = (21.7, 50.9), 0.3
+
+
+def shares_within(stretch: tuple[float, float], ends: np.ndarray) -> np.ndarray:
+    """Share of each element, ``ends`` (n, 2) [m], that lies within a stretch."""
+    inside = np.clip(ends, *stretch)
+    return np.asarray(np.diff(inside, axis=1)[:, 0] / np.diff(ends, axis=1)[:, 0])
+
+
 @pytest.mark.parametrize(
     ("line", "names", "effects"),
     [
         (elastic_line(2), (UP, SLOPE, U), ALONG),
         (staggered(), (UP, SLOPE, ASIDE, TURN, U), ALONG | {"lateral_motion"}),
+        (elastic_line(2), (UP, SLOPE, U), ALONG | {"worn_wire"}),
     ],
-    ids=["upright", "three planes"],
+    ids=["upright", "three planes", "worn"],
 )
 def test_a_snapshot_shows_what_the_stretch_adds(
     line: LineData, names: tuple[str, ...], effects: frozenset[str]
 ) -> None:
-    problem, mesh = problem_of(line, effects), mesh_of(line, 2)
+    mesh = mesh_of(line, 2)
+    worn = WornWire(CONTACT_WIRE, *WORN, LOST)
+    defects = (worn,) if "worn_wire" in effects else ()
+    problem = with_defects(problem_of(line, effects, defects=defects))
     model, form = find_form(problem, mesh)
     rng = np.random.default_rng(4)
     motion = {(name, False): 1e-3 * rng.normal(size=(1, mesh.n_nodes)) for name in names}
@@ -66,6 +82,8 @@ def test_a_snapshot_shows_what_the_stretch_adds(
         strain = (strain_rows(model, block.name) * state[unknowns_along(model, block.name)]).sum(1)
         assert wire.axial_stiffness is not None
         expected = wire.axial_stiffness * strain
+        if defects and block.name == CONTACT_WIRE:
+            expected *= 1.0 - LOST * shares_within(WORN, mesh.x(mesh.elements(block.name)))
         found = values.of(KINDS["tension"], slots, 0, known)
         # Numbers of 4 bytes, and slopes rounded to 1e-10.
         scale = np.abs(expected).max()

@@ -42,7 +42,8 @@ class MeshTable(Table):
         ge=1,
         le=100,
         description="how many times longer elements are midway between neighbouring droppers than "
-        "beside them, where wires bend over some centimetres",
+        "beside them, where wires bend over some centimetres; that of many elements: of eight to a "
+        "gap 6 makes 4 times longer ones",
     )
     file: str | None = Field(
         None,

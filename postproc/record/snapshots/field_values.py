@@ -100,8 +100,8 @@ class FieldValues:
         tension = np.stack(known.tension)[:, nodes]
         if (ALONG, False) not in known.motions:
             return tension
-        axial = self._wires[block.name].axial_stiffness
-        if not axial:
+        wire = self._wires[block.name]
+        if not wire.axial_stiffness:
             return tension
         along = known.motions[ALONG, False][:, nodes]
         length = np.diff(block.points[:, 0])
@@ -113,7 +113,8 @@ class FieldValues:
             rows = slope_rows(whole, _ends(*(part[None, nodes] for part in at_rest))[0]) + more
             moved = _ends(*(known.motions[name, False][:, nodes] for name in names))
             strain += np.where(joined, (rows * moved).sum(axis=2), 0.0)
-        gained = axial * strain
+        section, _ = wire.left_of(_ends_of(block))
+        gained = wire.axial_stiffness * section * strain
         tension[:, :-1] += gained
         # The last point of a piece has no element ahead of it.
         last = np.append(block.breaks, nodes.size) - 1
@@ -140,9 +141,16 @@ class FieldValues:
         nodes = block.nodes
         height = self._height[nodes] + known.motions[UP, False][:, nodes]
         slope = self._slope[nodes] + known.motions[SLOPE, False][:, nodes]
-        moment = curvature(block.points[:, 0], height, slope, block.breaks)
-        moment *= self._wires[block.name].bending_stiffness
-        return moment
+        wire = self._wires[block.name]
+        _, bending = wire.left_of(_ends_of(block))
+        stiffness = wire.bending_stiffness * bending
+        return bending_moment(block.points[:, 0], height, slope, block.breaks, stiffness)
+
+
+def _ends_of(block: Block) -> np.ndarray:
+    """Places of both ends of the elements of a wire, (n - 1, 2) [m], and so between its pieces."""
+    x = block.points[:, 0]
+    return np.column_stack([x[:-1], x[1:]])
 
 
 def _ends(height: np.ndarray, slope: np.ndarray) -> np.ndarray:
@@ -151,8 +159,10 @@ def _ends(height: np.ndarray, slope: np.ndarray) -> np.ndarray:
     return np.stack(parts, axis=2)
 
 
-def curvature(x: np.ndarray, w: np.ndarray, slope: np.ndarray, breaks: np.ndarray) -> np.ndarray:
-    """d2w/dx2 at the nodes of a wire of cubic elements, the mean of both sides of a node [1/m].
+def bending_moment(
+    x: np.ndarray, w: np.ndarray, slope: np.ndarray, breaks: np.ndarray, stiffness: np.ndarray
+) -> np.ndarray:
+    """EI d2w/dx2 at the nodes of a wire of cubic elements, the mean of both sides of a node [N m].
 
     Parameters
     ----------
@@ -162,15 +172,18 @@ def curvature(x: np.ndarray, w: np.ndarray, slope: np.ndarray, breaks: np.ndarra
         Deflections [m] and slopes [-].
     breaks : ndarray
         Nodes at which further pieces begin.
+    stiffness : ndarray, shape (n - 1,)
+        Bending stiffness between neighbouring nodes [N m2].
     """
     length = np.diff(x)
     joined = np.ones(length.size)
     joined[breaks - 1] = 0.0
     length[breaks - 1] = 1.0
+    stiffness = joined * stiffness
     rise = 6.0 * np.diff(w, axis=1) / length
     left, right = slope[:, :-1], slope[:, 1:]
     result = np.zeros(np.shape(w))
-    result[:, :-1] += joined * (rise - 4.0 * left - 2.0 * right) / length
-    result[:, 1:] += joined * (2.0 * left + 4.0 * right - rise) / length
+    result[:, :-1] += stiffness * (rise - 4.0 * left - 2.0 * right) / length
+    result[:, 1:] += stiffness * (2.0 * left + 4.0 * right - rise) / length
     beside = np.append(joined, 0.0) + np.append(0.0, joined)
     return np.asarray(result / np.maximum(beside, 1.0))

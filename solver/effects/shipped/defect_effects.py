@@ -101,6 +101,9 @@ def _kinks(laws: Simulated, problem: Problem) -> Simulated:
     for kink in _of_kind(problem, Kink):
         wire = problem.line.wire(kink.wire)
         decay = float(np.sqrt(wire.bending_stiffness / wire.tension))
+        # A worn wire straightens over less; where wear begins beside the kink, the mean counts.
+        _, left = wire.left_of(kink.x + decay * np.array([[-1.0, 1.0]]))
+        decay *= float(np.sqrt(left[0]))
         bent.append(BentWire(kink.wire, kink.x, kink.angle, decay))
     return replace(laws, surface=(*laws.surface, *bent))
 

@@ -71,6 +71,18 @@ def test_graded_elements_are_shortest_at_the_cuts(make_line: Callable[..., LineD
         np.testing.assert_allclose(length, length[:, ::-1], atol=PLACE)
 
 
+def test_eight_graded_elements_differ_less_than_their_law(
+    make_line: Callable[..., LineData],
+) -> None:
+    """The key's description says 4 for 6, as each element has the mean of the law along it."""
+    mesh = make_mesh(line_from(make_line()), 8, grading=6.0)
+    length = np.diff(mesh.x(mesh.wires[CONTACT_WIRE])).reshape(-1, 8)
+    # Nodes lie at tanh(a s), s from -1 to 1, of which the slopes at 0 and 1 have the ratio 6.
+    law = np.tanh(np.arccosh(np.sqrt(6.0)) * np.array([0.0, 0.25, 0.75, 1.0]))
+    assert (law[1] - law[0]) / (law[3] - law[2]) == pytest.approx(4.0, abs=0.05)
+    np.testing.assert_allclose(length[:, 3] / length[:, 0], 3.98, atol=0.02)
+
+
 def test_refinement_multiplies_the_gaps_next_to_masts_only(
     make_line: Callable[..., LineData],
 ) -> None:

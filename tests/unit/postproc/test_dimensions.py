@@ -86,6 +86,16 @@ def test_each_table_that_is_shown_has_its_unit(tables: dict[str, h5py.Dataset]) 
     )
 
 
+def test_extremes_say_what_they_are_of(tables: dict[str, h5py.Dataset]) -> None:
+    """Before a channel's own meaning, which may begin with an article or with "how far"."""
+    kept = [path for path in tables if path.startswith("extremes/0/") and tables[path].ndim == 2]
+    assert kept
+    for path in kept:
+        meaning = tables["line_channels/" + path.rpartition("/")[2]].attrs["long_name"]
+        said = tables[path].attrs["long_name"]
+        assert bytes(said) == b"smallest and largest of all steps: " + bytes(meaning)
+
+
 def test_places_and_numbers_are_the_values_of_dimensions(tables: dict[str, h5py.Dataset]) -> None:
     for name, table in (("steady_arm", "line/arm_x"), ("dropper", "line/dropper_x")):
         np.testing.assert_array_equal(tables[name], tables[table])

@@ -305,6 +305,40 @@ def test_a_picture_wider_than_the_snapshots_is_refused(
     assert film.n_pictures == 3
 
 
+def test_a_film_of_a_stretch_is_of_the_time_when_the_train_is_there(
+    tmp_path: Path, make_march: Any, record_run: Any
+) -> None:
+    march = make_march(n_steps=1000, separations=(0.0,))
+    x = march.position(0.0)[0], march.position(1.0)[0]
+    stretch = x[0] + 0.4 * (x[1] - x[0]), x[0] + 0.9 * (x[1] - x[0])
+    path = tmp_path / "fields.xdmf"
+    march.drive(
+        FieldRecorder(
+            march.comm, path, march.recorded, every=50, record=FieldRecord(stretch=stretch)
+        )
+    )
+    record_run(tmp_path / "run.h5", march)
+    with pictures_of(tmp_path, FilmOptions()) as pictures:
+        # Half the stretch fills a picture, 0.55 of which is behind the train; with 50 ms between
+        # snapshots, and 3 m by which a picture may reach beyond them.
+        assert 0.4 + 0.275 * 0.5 - 0.09 <= pictures.times[0] <= 0.4 + 0.275 * 0.5 + 0.05
+        assert 0.9 - 0.225 * 0.5 - 0.05 <= pictures.times[-1] <= 0.9 - 0.225 * 0.5 + 0.09
+        assert pictures.left_out + len(pictures) == 21
+        for time in pictures.times.tolist():
+            pictures.show(time)
+    with pytest.raises(InputError, match="where the train is; the first shows it from"):
+        animate.animate(tmp_path, FilmOptions(0.0, 0.2), None, progress=False)
+
+
+def test_a_film_needs_wires(tmp_path: Path, make_march: Any, record_run: Any) -> None:
+    march = make_march(n_steps=200, separations=(0.0,))
+    path, record = tmp_path / "fields.xdmf", FieldRecord(parts=("droppers",))
+    march.drive(FieldRecorder(march.comm, path, march.recorded, every=50, record=record))
+    record_run(tmp_path / "run.h5", march)
+    with pytest.raises(InputError, match=r"no wire of the line.*output\.field_parts"):
+        animate.animate(tmp_path, FilmOptions(), None, progress=False)
+
+
 def test_coaches_carry_all_pantographs() -> None:
     for position in (np.array([100.0]), np.array([100.0, 0.0]), np.array([400.0, 200.0, 31.0])):
         spans = scenery.coaches(position)

@@ -15,7 +15,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
 from catenary.postproc.record.snapshots.blocks import ARMS, MASTS, blocks_of
 from catenary.postproc.record.snapshots.field_kinds import FIELDS
 from catenary.postproc.record.snapshots.field_layout import BlockTables, Course, FieldRecord
-from catenary.postproc.record.snapshots.field_values import curvature
+from catenary.postproc.record.snapshots.field_values import bending_moment
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 
 AT_REST = {own.name for own in dataclasses.fields(BlockTables)}
@@ -93,9 +93,11 @@ def test_all_fields_have_their_values(tmp_path: Path, make_march: Any) -> None:
         np.testing.assert_array_equal(data["tension"], march.tension[nodes])
         stiffness = march.line.wire(name).bending_stiffness
         height = march.mesh.points[nodes, 2] + march.wave(0.35, x)
-        bent = curvature(x, height[None], march.motion(0.35, x, "theta_y", False)[None], NO_BREAKS)
+        slope = march.motion(0.35, x, "theta_y", False)
+        each = np.full(x.size - 1, stiffness)
+        bent = bending_moment(x, height[None], slope[None], NO_BREAKS, each)
         np.testing.assert_allclose(
-            data["bending_moment"], stiffness * bent[0], rtol=1e-6, atol=1e-4 * stiffness
+            data["bending_moment"], bent[0], rtol=1e-6, atol=1e-4 * stiffness
         )
     droppers = blocks[DROPPERS].cell_data
     np.testing.assert_allclose(droppers["dropper_force"], view.dropper_force, rtol=1e-6)
@@ -106,14 +108,14 @@ def test_all_fields_have_their_values(tmp_path: Path, make_march: Any) -> None:
 NO_BREAKS = np.zeros(0, dtype=int)
 
 
-def test_curvature_of_a_cubic_is_that_of_the_cubic() -> None:
-    x = np.array([0.0, 0.4, 1.5, 2.0, 4.0])
+def test_moment_of_a_cubic_is_that_of_the_cubic() -> None:
+    x, stiffness = np.array([0.0, 0.4, 1.5, 2.0, 4.0]), np.ones(4)
     w, slope = x**3 - 2 * x**2, 3 * x**2 - 4 * x
-    found = curvature(x, w[None], slope[None], NO_BREAKS)[0]
+    found = bending_moment(x, w[None], slope[None], NO_BREAKS, stiffness)[0]
     np.testing.assert_allclose(found, 6 * x - 4, rtol=1e-12)
     # Two pieces of other slopes, which nothing joins.
     lifted = np.where(x > 1.0, 5.0 + x, w), np.where(x > 1.0, 1.0, slope)
-    found = curvature(x, lifted[0][None], lifted[1][None], np.array([2]))[0]
+    found = bending_moment(x, lifted[0][None], lifted[1][None], np.array([2]), stiffness)[0]
     np.testing.assert_allclose(found, [-4.0, -1.6, 0.0, 0.0, 0.0], atol=1e-12)
 
 
