@@ -86,9 +86,8 @@ def _template() -> Template:
 
 
 def _whole(text: str) -> str:
-    """Text in which no line ends between a figure and its unit, or within the unit."""
-    text = _FIGURE.sub("\N{NO-BREAK SPACE}\\1", text)
-    return _UNIT.sub(lambda found: found[0].replace("/", "/\N{WORD JOINER}"), text)
+    """HTML in which no line ends between a figure and its unit, or within the unit."""
+    return _UNIT.sub(r'<span class="unit">\g<0></span>', _FIGURE.sub("\N{NO-BREAK SPACE}\\1", text))
 
 
 def _with_commands(text: Any) -> Any:

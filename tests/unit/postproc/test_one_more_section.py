@@ -53,7 +53,7 @@ def test_a_section_is_one_function(
     monkeypatch.setitem(PICTURES, "speed", ("course",))
     files = {path.name for path in write_report(run_folder, tmp_path).files}
     assert "course.png" in files
-    page = (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text().replace("\N{NO-BREAK SPACE}", " ")
     assert page.index('<h2 id="run">The run</h2>') < page.index(
         '<h2 id="speed">Course &lt;of&gt; the train</h2>'
     )
