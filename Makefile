@@ -182,6 +182,9 @@ links:
 
 mypy: links
 	MYPYPATH=build/typing $(PYTHON) -m mypy --exclude '/(cases/api|solver/base)/' -p catenary
+	@# Benchmarks run by themselves only: this sees when what they call has gone.
+	MYPYPATH=build/typing:tests/support:tests/benchmarks/drivers $(PYTHON) -m mypy --allow-untyped-defs \
+	    --ignore-missing-imports tests/benchmarks/*.py
 
 format: setup-tests ## bring all files into the format of ruff and clang-format
 	$(PYTHON) -m ruff check --fix .

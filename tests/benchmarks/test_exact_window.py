@@ -83,10 +83,11 @@ def test_an_exact_window_costs_what_waves_have_reached(
     rest = line_at_rest(problem, mesh_of(scene))
     short = replace(problem, train=replace(problem.train, end=problem.train.start + 1.0))
     for mode in (EXACT, OFF):
-        # Loops are compiled, or loaded, before anything is timed.
+        # What is read once is read before anything is timed.
         for seen in (None, Forces()):
             marched(rest._replace(problem=short), WindowChoice(mode), seen)
-    bare, shown = {}, {}
+    bare: dict[str, float] = {}
+    shown: dict[str, float] = {}
     forces = {EXACT: Forces(), OFF: Forces()}
     for kept in (False, True):
         for mode, seen in forces.items():

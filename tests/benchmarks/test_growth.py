@@ -117,7 +117,7 @@ def test_scaling_over_ranks(benchmark: Any, spans: int) -> None:
         ("each", f"{spans} spans each, side by side"),
     ):
         print(f"  {what:36}{costs[name].min():15.1f}{np.median(costs[name]):18.1f}")
-    found = {}
+    found: dict[str, float] = {}
     for what, faster, slower, ranks in (
         ("strong scaling", "one", "two", 2),
         ("weak scaling", "one", "twice", 1),

@@ -34,7 +34,7 @@ def test_all_bodies_keep_their_joints_and_energy(seconds: int) -> None:
     pantograph = FullPantograph(paper.data(), STATIC, HEIGHT, Stepping(0.0, DT))
     pantograph.place(HEIGHT + STATIC / 6000.0)
     system, head = pantograph.system, pantograph.motion.numbers[paper.HEAD]
-    heights, lengths = np.empty(n_steps + 1), np.empty((n_steps + 1, len(system.lines)))
+    heights, lengths = np.empty(n_steps + 1), np.empty((n_steps + 1, len(system.lines.names)))
     heights[0] = pantograph.motion.position[head, 2]
     lengths[0] = system.lines.geometry(pantograph.motion)[0]
     before, opened, wall = energy(system, pantograph.motion), 0.0, 0.0

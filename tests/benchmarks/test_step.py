@@ -120,7 +120,7 @@ def time_march(benchmark: Any, at_rest: tuple[Any, ...], name: str, scheme: str)
         train=replace(train, end=train.start + length),
         numerics=replace(problem.numerics, scheme=scheme),
     )
-    walls = []
+    walls: list[float] = []
 
     def march_once() -> None:
         with March(MPI.COMM_SELF, problem, model, form, lift) as march:
@@ -137,7 +137,7 @@ def test_a_run_with_all_records(benchmark: Any, pantographs: str, tmp_path: Path
     set-up and report are not."""
     train = f"train.pantographs={TRAINS[pantographs]}"
     scene = load_scene(CASE, ["train.start_m=310", train])
-    walls = []
+    walls: list[float] = []
 
     def run_once() -> None:
         # Each in a folder of its own: to take the place of an earlier file costs what it holds.

@@ -49,7 +49,7 @@ def march_of(*settings: str) -> RepeatedMarch:
 def times(processor_time: None) -> dict[str, float]:
     """Least processor time of a step of each [us]."""
     marches = {name: march_of(*settings) for name, settings in MARCHES.items()}
-    widths = {name: march.widths for name, march in marches.items()}
+    widths = {name: march.size.planes for name, march in marches.items()}
     least = in_turns(marches, ROUNDS)
     for march in marches.values():
         march.destroy()

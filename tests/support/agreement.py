@@ -60,14 +60,14 @@ def ways(end: float, dt: float, methods: tuple[str, ...] = tuple(METHODS)) -> di
         begin = time.perf_counter()
         stepper = Stepper(loaded, dt, method)
         stepper.begin(rest, 0.0)
-        heights, opened = [rest.position[number, 2]], 0.0
+        seen, opened = [rest.position[number, 2]], 0.0
         for count in range(1, round(end / dt) + 1):
             stepper.step()
             opened = max(opened, stepper.violation())
             if count % round(EVERY / dt) == 0:
-                heights.append(stepper.motion.position[number, 2])
+                seen.append(stepper.motion.position[number, 2])
         name = f"{method}, steps of {1e3 * dt:g} ms"
-        found[name] = Way(np.array(heights), opened, time.perf_counter() - begin)
+        found[name] = Way(np.array(seen), opened, time.perf_counter() - begin)
     begin = time.perf_counter()
     actuator = system.force(ambrosio.ACTUATOR)
     assert isinstance(actuator, Actuator)

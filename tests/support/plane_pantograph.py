@@ -159,7 +159,8 @@ def head_heights(
     start = rest(push, load(times[0]))
 
     def rates(time: float, y: np.ndarray) -> tuple[float, ...]:
-        return (y[2], y[3], *acceleration(*y, push, load(time), MASSES, INERTIAS))
+        a, s, da, ds = y
+        return (da, ds, *acceleration(a, s, da, ds, push, load(time), MASSES, INERTIAS))
 
     way = solve_ivp(
         rates,

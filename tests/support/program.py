@@ -26,8 +26,8 @@ from catenary.postproc.read.results import Results
 from catenary.solver.time_loop.views.channels import CHANNELS
 
 MPIRUN = shutil.which("mpirun")
-# For anything that is to end by itself [s]: the first of a fresh clone compiles for half a minute,
-# of which a loaded machine makes some. Below the limit of a pytest test.
+# For anything that is to end by itself [s], on a machine that others load. Below the limit of a
+# pytest test.
 LIMIT = 240.0
 # The same with several ranks. One that waits keeps its core busy: if others want cores too, each
 # message waits for a turn, and the longest test of 18 s took 120. Below the limit of a pytest test,

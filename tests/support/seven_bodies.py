@@ -15,6 +15,7 @@ from catenary.mbs.rigid.system import System
 
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD
 STATIC_FORCE = 150.0
+assert ambrosio.INITIAL_ARM_HEIGHT is not None
 HOLDER = PrescribedPoint("holder", ARM, Constant(ambrosio.INITIAL_ARM_HEIGHT))
 # The lower link is top-heavy between its two balls: its mass lies above the line through them, by
 # Table 4's -0.025 m, and it tips over with 2.7 1/s. What starts with round-off of 1e-12 m has

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from plain_mesh import mesh_on
@@ -115,12 +116,12 @@ def mesh_of(line: LineData | Line, elements_per_gap: int) -> LineMesh:
     return mesh_on(line, np.append(gaps.ravel(), cuts[-1]))
 
 
-def numerics(dt: float, scheme: str = "one_solve", **changes: float) -> Numerics:
+def numerics(dt: float, scheme: str = "one_solve", **changes: Any) -> Numerics:
     """Average acceleration; the fixed-point correction as tight as round-off lets it be."""
     usual = Numerics(
         dt=dt, scheme=scheme, beta=0.25, gamma=0.5, eps_d=1e-13, eps_v=1e-10, max_iterations=200
     )
-    return replace(usual, **changes)  # type: ignore[arg-type]
+    return replace(usual, **changes)
 
 
 def train(
@@ -141,9 +142,7 @@ def train(
     return Train(speed, start, end, raise_time, placements)
 
 
-def problem_of(
-    line: LineData | Line, effects: frozenset[str] = WHOLE, **changes: object
-) -> Problem:
+def problem_of(line: LineData | Line, effects: frozenset[str] = WHOLE, **changes: Any) -> Problem:
     """A problem on ``line`` with the damping and contact of EN 50318; keywords replace fields."""
     first, last = line.running_range
     usual = Problem(
@@ -156,4 +155,4 @@ def problem_of(
         residual_stiffness_ratio=0.0,
         effects=effects,
     )
-    return replace(usual, **changes)  # type: ignore[arg-type]
+    return replace(usual, **changes)

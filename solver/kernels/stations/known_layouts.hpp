@@ -58,11 +58,10 @@ constexpr Shipped kTensioned = [] {
     return of;
 }();
 
-/// Stations whose unknowns are all joined with each other, plane by plane.
-constexpr Shipped dense(int unknowns, int plane = kMostUnknowns) {
-    Wires planes{};
-    for (int u = 0; u < kMostUnknowns; ++u) planes[u] = static_cast<int8_t>(u / plane);
-    Shipped of = shipped(unknowns, {}, plane, false, planes);
+/// Stations whose unknowns are all joined within themselves, plane by plane, as by whatever hangs
+/// between wires or holds them, and from station to station by the wires.
+constexpr Shipped hung(int unknowns, int plane = kMostUnknowns) {
+    Shipped of = shipped(unknowns, {}, plane);
     of.rows.own = of.factors.own;
     of.is_for_scenes = false;
     return of;
@@ -91,12 +90,12 @@ constexpr Shipped kShipped[] = {
     by_mass(kTensioned),
     kTensioned,
     // Any lines of these widths.
-    dense(4),
-    dense(8, 4),
-    dense(6),
-    dense(8),
-    dense(10),
-    dense(12),
+    hung(4),
+    hung(8, 4),
+    hung(6),
+    hung(8),
+    hung(10),
+    hung(12),
 };
 
 /// Whether builds that check each access have kernels of their own for one of them: with checks

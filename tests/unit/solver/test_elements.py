@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from catenary.solver.model import beam, exact_beam
@@ -58,8 +58,6 @@ def test_energies_of_cubics_are_exact(length: float, coefficients: list[float]) 
         assert unknowns @ matrix @ unknowns == pytest.approx(whole(length), abs=round_off + 1e-300)
 
 
-# The first example compiles.
-@settings(deadline=None)
 @given(lengths, inside, st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4))
 def test_shape_functions_interpolate_cubics_and_their_slopes(
     length: float, xi: float, coefficients: list[float]
