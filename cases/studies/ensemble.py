@@ -38,7 +38,7 @@ from catenary.solver.ensemble.shared_line import SharedLine, why_alone
 from catenary.solver.kernels import native
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
-from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, sound_line
+from catenary.solver.statics.line_at_rest import LineAtRest, SoundLine, line_at_rest, sound_line
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views import channels
@@ -133,7 +133,11 @@ class Marched(NamedTuple):
 
 
 class Marches:
-    """Marches scenes in this process alone; keeps the line of the latest for those to come."""
+    """Marches scenes in this process alone; keeps the line of the latest for those to come.
+
+    A scene marches side by side with others that it comes with, or by itself: whether those before
+    it had its line changes no digit, so that processes may share scenes as they like.
+    """
 
     def __init__(self) -> None:
         self._key = ""
@@ -148,7 +152,7 @@ class Marches:
         """
         groups: dict[str, list[tuple[int, Scene]]] = {}
         for number, scene in enumerate(scenes):
-            groups.setdefault(_key_of_line(scene), []).append((number, scene))
+            groups.setdefault(key_of_line(scene), []).append((number, scene))
         for key, members in groups.items():
             yield from self._on_a_line(key, dict(members))
 
@@ -174,7 +178,7 @@ class Marches:
             yield from (Marched(number, str(error)) for number in problems)
             return
         left = dict.fromkeys(problems)
-        if line.shared is not None:
+        if line.shared is not None and len(problems) > 1:
             marched = march_side_by_side(line.shared, line.fitting(problems))
             for ended in _by_lots(marched, len(line.shared.lanes)):
                 # A march by itself says why a train has no place, and why a step has no forces.
@@ -194,7 +198,7 @@ class Marches:
 
     def _line_for(self, key: str, scenes: dict[int, Scene], problems: dict[int, Problem]) -> _Line:
         first = next(iter(problems))
-        together = not why_alone(problems[first]) and (key == self._key or len(problems) > 1)
+        together = not why_alone(problems[first]) and len(problems) > 1
         trains = [problem.train for problem in problems.values()]
         # The last strip starts behind this place.
         begin = min(one.start - max(place.behind for place in one.placements) for one in trains)
@@ -207,8 +211,9 @@ class Marches:
         return self._line
 
 
-def _key_of_line(scene: Scene) -> str:
-    """All keys of the line of a scene as text, without errors of the droppers' lengths."""
+def key_of_line(scene: Scene) -> str:
+    """All keys of the line of a scene as text, without errors of the droppers' lengths: scenes with
+    the same text may march side by side."""
     tables = {name: own for name, own in resolved(scene).items() if name not in OF_THE_TRAIN}
     if _OF_THE_REST in tables.get("irregularities", {}):
         tables["irregularities"] = {**tables["irregularities"], _OF_THE_REST: "some"}
@@ -238,7 +243,7 @@ class _Line:
     ) -> None:
         self._mesh = mesh_of(scene)
         self._errors = problem.irregularities.lengths
-        self._sound = None if self._errors is None else sound_line(problem, self._mesh)
+        self._sound: SoundLine | None = None
         self._rest: LineAtRest | None = None
         self._latest: tuple[Model, dict[str, np.ndarray]] | None = None
         at_rest = self.rest_of(problem)
@@ -271,10 +276,14 @@ class _Line:
         InputError
             If there is none.
         """
-        if self._rest is None or problem.irregularities.lengths != self._errors:
-            at_rest = line_at_rest(problem, self._mesh, self._sound)
+        errors = problem.irregularities.lengths
+        if self._rest is None or errors != self._errors:
+            if errors is not None and self._sound is None:
+                self._sound = sound_line(problem, self._mesh)
+            # Without errors a line is found by itself, whichever scenes came before.
+            at_rest = line_at_rest(problem, self._mesh, None if errors is None else self._sound)
             refuse_lost_wire(at_rest.model, at_rest.form)
-            self._errors, self._rest = problem.irregularities.lengths, at_rest
+            self._errors, self._rest = errors, at_rest
         hung = self._rest.problem
         of_train = {name: getattr(problem, name) for name in ("train", "contact", "evaluation")}
         return self._rest._replace(problem=replace(hung, **of_train))

@@ -289,12 +289,40 @@ def evaluate(scenes: Sequence[Scene], pool: Pool[Any] | None = None) -> list[dic
     """
     if pool is None:
         return _summaries(scenes)
-    size = max(1, -(-len(scenes) // pool.n))
-    pieces = [scenes[at : at + size] for at in range(0, len(scenes), size)]
-    found = [one for outcome in in_order(pool.of(pieces)) for one in outcome.get()]
+    found: dict[int, dict[str, Any]] = {}
+    pieces = pieces_of(scenes, pool.n)
+    outcomes = in_order(pool.of([[scenes[number] for number in piece] for piece in pieces]))
+    for outcome in outcomes:
+        found.update(zip(pieces[outcome.number], outcome.get(), strict=True))
     if len(found) < len(scenes):
         raise Interrupted("the study was interrupted; the same command continues it")
-    return found
+    return [found[number] for number in range(len(scenes))]
+
+
+def pieces_of(scenes: Sequence[Scene], n: int) -> list[list[int]]:
+    """Numbers of scenes in pieces for ``n`` processes, no larger than need be.
+
+    Scenes of one line that are alone in a piece are alone in all: they march by themselves, and
+    others side by side, however many processes there are.
+    """
+    from catenary.cases.studies.ensemble import key_of_line
+
+    lines: dict[str, list[int]] = {}
+    for number, scene in enumerate(scenes):
+        lines.setdefault(key_of_line(scene), []).append(number)
+    size = max(1, -(-len(scenes) // n))
+    pieces: list[list[int]] = []
+    for line in lines.values():
+        while line:
+            if not pieces or len(pieces[-1]) >= size:
+                pieces.append([])
+            n_next = size - len(pieces[-1])
+            if len(line) > 1:  # two at least, and no single one is left
+                n_next = max(2, n_next)
+                n_next += len(line) - n_next == 1
+            pieces[-1] += line[:n_next]
+            line = line[n_next:]
+    return pieces
 
 
 @contextmanager

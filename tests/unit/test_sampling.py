@@ -16,6 +16,7 @@ from scenes import Scene, line_of, load_scene, read_draft
 from scipy import stats
 
 from catenary import InputError
+from catenary.cases.scene.input.toml_input import parse_assignment
 from catenary.cases.studies.sampling.samples import sample_name, samples
 from catenary.cases.studies.sampling.tables import SamplingTable, read_sampling, sampling_of
 from catenary.cases.studies.sweep.jobs import scene_of
@@ -187,6 +188,40 @@ def test_a_field_is_added_to_what_the_scene_has() -> None:
     assert stagger == pytest.approx(
         [0.2 * stagger[0] / abs(stagger[0]) * s for s in signs], abs=1e-4
     )
+
+
+def test_a_field_is_added_to_a_survey_from_a_file(tmp_path: Path) -> None:
+    """As to the same errors written into the scene."""
+    survey = tmp_path / "droppers.csv"
+    survey.write_text("span,dropper,error_mm\n2,3,40\n")
+    key = "irregularities.dropper_lengths.by_dropper"
+    found = []
+    for own in (f'{key}_file="{survey}"', f"{key}=[[2, 3, 40.0]]"):
+        given = read_draft("en50318_2002").assigned([(*parse_assignment(own), "in the test")])
+        field = {"type": "normal", "standard_deviation": 5.0}
+        first = drawn(given.scene(), n=2, fields={LENGTHS: field})[0]
+        lengths = scene_of(given, first, several=True).irregularities.dropper_lengths
+        assert lengths is not None
+        found.append(lengths.by_dropper)
+    assert found[0] == found[1]
+    assert dict(((s, d), e) for s, d, e in found[0])[2, 3] == pytest.approx(40.0, abs=25.0)
+
+
+def test_entries_of_spans_from_a_file_vary(tmp_path: Path) -> None:
+    """The others are the file's, and so is their number."""
+    (tmp_path / "spans.csv").write_text("span_m\n" + "60\n" * 20)
+    given = read_draft("en50318_2002").assigned(
+        (*parse_assignment(one), "in the test")
+        for one in (
+            *("line.dropper.positions_m=", "line.dropper.count=7", "line.dropper.spacing_m=7"),
+            *("line.span_m=", "line.n_spans=", f'line.spans_file="{tmp_path}/spans.csv"'),
+        )
+    )
+    vary = {"type": "uniform", "least": 59.0, "most": 59.5}
+    first = drawn(given.scene(), n=2, keys={"line.span_m.6": vary})[0]
+    line = scene_of(given, first, several=True).line
+    assert line.n_spans == 20
+    assert [x == 60.0 for x in line.span_m] == [i != 6 for i in range(20)]
 
 
 def test_defects_by_chance_come_as_often_as_they_should() -> None:

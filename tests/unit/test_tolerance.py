@@ -64,6 +64,23 @@ def with_errors(group: Group, errors: np.ndarray) -> Scene:
 # --- errors --------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("from_file", [False, True], ids=["in the scene", "in a file"])
+def test_errors_are_added_to_those_that_droppers_have(from_file: bool, tmp_path: Path) -> None:
+    key = "irregularities.dropper_lengths.by_dropper"
+    (tmp_path / "droppers.csv").write_text("span,dropper,error_mm\n2,3,40\n")
+    own = {f"{key}_file": str(tmp_path / "droppers.csv")} if from_file else {key: [[2, 3, 40.0]]}
+    given = tiny().assigned((k, v, "in the test") for k, v in own.items())
+    group = group_of(DROPPERS, given.scene())
+    values = group.values(np.arange(54.0))
+    scene = given.assigned((k, v, "in the test") for k, v in values.items()).scene()
+    lengths = scene.irregularities.dropper_lengths
+    assert lengths is not None and lengths.by_dropper is not None
+    found = {(int(span), int(number)): error for span, number, error in lengths.by_dropper}
+    expected = dict(zip(group.places, np.arange(54.0), strict=True))
+    assert group.names[11] == "span 2, dropper 3"
+    assert found == expected | {(2, 3): 51.0}
+
+
 def test_a_dropper_that_is_too_long_carries_less() -> None:
     scene = tiny().scene()
     group = group_of(DROPPERS, scene)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from catenary.cases.studies.uncertainty.run_table import (
     read_run_table,
     run_table,
 )
+from catenary.cases.studies.uncertainty.sensitivity import indices
 from catenary.postproc.report.study_table import write_files
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
@@ -367,3 +369,16 @@ def test_sweeps_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     (tmp_path / "h" / "sweep.json").write_text('{"case": 1}')
     with pytest.raises(InputError, match="is damaged"):
         merged(first, tmp_path / "h")
+
+
+def test_a_statistic_that_is_zero_in_most_runs_is_evaluated_without_warnings() -> None:
+    """Half of the runs, of which bounds are made, may then be alike."""
+    rng = np.random.default_rng(1)
+    rows = [
+        {"variant": f"v{i}", "key": x, "outcome": "done", "loss_percent": float(i == 7)}
+        for i, x in enumerate(rng.random(120))
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _, found, _ = indices(run_table(rows))
+    assert [row["key"] for row in found] == ["key"]

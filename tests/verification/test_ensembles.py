@@ -20,6 +20,7 @@ from catenary.cases.run.prepared import sound_rest
 from catenary.cases.scene.input.toml_input import REMOVED
 from catenary.cases.studies import ensemble as scenes_on_lines
 from catenary.cases.studies.ensemble import Marched, Marches
+from catenary.cases.studies.scene_sets import pieces_of
 from catenary.solver.ensemble import marches, shared_line
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import SharedLine
@@ -101,6 +102,37 @@ def test_scenes_side_by_side_give_what_their_own_runs_give(case: str) -> None:
     found, together = marched(scenes_of(case, changes))
     assert together and [one.outcome for one in found] == ["done"] * 3
     assert differences(found[1].summary(), own_run(case, changes[1])) == []
+
+
+def test_what_was_marched_before_changes_no_digit() -> None:
+    """As processes share a sweep in any order: a lone scene marches by itself, and the line at rest
+    is that of its errors alone."""
+    name = "irregularities.dropper_lengths"
+    errors = [{f"{name}.standard_deviation_mm": d, f"{name}.seed": 3} for d in (1.0, 5.0)]
+    changes = [{"train.speed_km_h": v} for v in (250.0, 240.0, 230.0)]
+    for others in changes, [one | changes[0] for one in errors]:
+        scenes = scenes_of("en50318_2002", others)
+        marches = Marches()
+        try:
+            list(marches.of([*scenes[1:], *scenes[1:]]))
+            (after,) = marches.of(scenes[:1])
+        finally:
+            marches.destroy()
+        (alone,), together = marched(scenes[:1])
+        assert not together and after.summary() == alone.summary()
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_no_process_gets_one_scene_of_several_on_a_line(n: int) -> None:
+    """It would march alone there, and beside the others without processes."""
+    speeds = [{"train.speed_km_h": 200.0 + number} for number in range(5)]
+    tension = "line.contact_wire.tension_N"
+    lines = [{tension: 19_000.0 + number} for number in range(3)]
+    scenes = scenes_of("en50318_2002", [*speeds, *lines, {**speeds[0], tension: 21e3}])
+    pieces = pieces_of([scenes[i] for i in (0, 5, 1, 6, 2, 7, 3, 8, 4)], n)
+    assert sorted(number for piece in pieces for number in piece) == list(range(9))
+    assert all(sum(number % 2 == 0 for number in piece) != 1 for piece in pieces)
+    assert len(pieces) <= n
 
 
 def test_lanes_are_filled_again_with_trains_of_other_lengths() -> None:

@@ -88,6 +88,18 @@ def absolute_names(raw: dict[str, Any], folder_of: Callable[[str], Path]) -> Non
             table[named] = str(base / name)
 
 
+def file_key_of(key: str, origin: Origin) -> str | None:
+    """The key that named the file from which a scene has the numbers of a dotted ``key``.
+
+    None if no file gave them. ``origin`` is that of the scene. Who gives the numbers anew takes
+    the name of the file away.
+    """
+    if key not in dict(origin.taken_in):
+        return None
+    places = ((f"{where}.{own}", f"{where}.{named}") for where, _, named, own, _ in _places({}))
+    return dict(places).get(key)
+
+
 # Reader of a file, called with its path, the begin of a sentence about it, and the raw scene.
 _Read = Callable[[Path, str, dict[str, Any]], Any]
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.csv_files import file_key_of
 from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.keys import list_of
 from catenary.cases.scene.problem import resolved
@@ -72,6 +73,11 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
             assigned.append([f"{key}={text}" for text in texts])
         else:
             lists.setdefault(above, {})[int(key.rpartition(".")[2])] = texts
+    for key in (*lists, *sampling.fields):
+        if named := file_key_of(key, scene.origin):  # its numbers are part of the samples' own
+            assigned.append([f"{named}="] * len(cube))
+            if key == "line.span_m":  # the file may say how many there are
+                assigned.append([f"line.n_spans={scene.line.n_spans}"] * len(cube))
     for key, entries in lists.items():
         assigned.append(_assigned_lists(key, value_at(own, key), entries, len(cube), where))
     for key, field, column in zip(

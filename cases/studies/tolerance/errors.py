@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.toml_input import value_at
+from catenary.cases.scene.input.csv_files import file_key_of
+from catenary.cases.scene.input.toml_input import REMOVED, value_at
 from catenary.cases.scene.keys.keys import list_of
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.problem import line_of, resolved
@@ -46,6 +47,7 @@ class Group:
     places : place of each error, as the scene's key takes it; of a number in a list that of its
         entry, from 0
     given : the scene's own value of the key
+    file_key : key of the file from which the scene has it, None of none
     """
 
     table: ErrorKind
@@ -55,15 +57,20 @@ class Group:
     key: str
     places: Sequence[Any]
     given: Any
+    file_key: str | None = None
 
     def values(self, errors: np.ndarray, before: Mapping[str, Any] = {}) -> dict[str, Any]:
         """The scene's key and its value with errors, shape (n,), in their unit, added to what it
         has in ``before``, or else in the scene."""
-        return {self.key: self._value(before.get(self.key, self.given), errors.tolist())}
+        found = {self.key: self._value(before.get(self.key, self.given), errors.tolist())}
+        return found if self.file_key is None else {self.file_key: REMOVED, **found}
 
     def _value(self, given: Any, own: Sequence[float]) -> Any:
         if isinstance(self.table, DropperErrors):
-            return [*given, *([*place, e] for place, e in zip(self.places, own, strict=True))]
+            errors = {(int(span), int(number)): error for span, number, error in given}
+            for place, error in zip(self.places, own, strict=True):
+                errors[place] = errors.get(place, 0.0) + error
+            return [[*place, error] for place, error in errors.items()]
         if isinstance(self.table, HeightErrors):
             return [[x, length_from_mm(e)] for x, e in zip(self.places, own, strict=True)]
         if isinstance(self.table, TensionErrors):
@@ -100,6 +107,7 @@ def groups_of(tables: Sequence[ErrorKind], scene: Scene) -> list[Group]:
         are switched off.
     """
     groups = [_group(table, scene, f"errors.{number}") for number, table in enumerate(tables)]
+    groups = [replace(one, file_key=file_key_of(one.key, scene.origin)) for one in groups]
     for number, group in enumerate(groups):
         refuse_idle(group.key, scene, f"errors.{number}")
     for (i, earlier), (j, later) in combinations(enumerate(groups), 2):

@@ -156,15 +156,18 @@ def _rbd_fast(keys: Sequence[str], x: np.ndarray, y: np.ndarray) -> Mapping[str,
     # SALib seeds NumPy's global generator: it is put back as it was.
     before = np.random.get_state()
     try:
-        found: Mapping[str, Any] = rbd_fast.analyze(
-            problem_of(keys),
-            x,
-            y,
-            M=_HARMONICS[len(y) >= _MANY],
-            num_resamples=_RESAMPLES[len(y) > _MOST],
-            conf_level=CONFIDENCE,
-            seed=_SEED,
-        )
+        # Of a statistic that is zero in most runs all values of a resample may be the same: its
+        # index, and with it the bounds, are no numbers.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found: Mapping[str, Any] = rbd_fast.analyze(
+                problem_of(keys),
+                x,
+                y,
+                M=_HARMONICS[len(y) >= _MANY],
+                num_resamples=_RESAMPLES[len(y) > _MOST],
+                conf_level=CONFIDENCE,
+                seed=_SEED,
+            )
     finally:
         np.random.set_state(before)
     return found
