@@ -216,6 +216,12 @@ def test_droppers_and_arms_are_those_of_the_summary(in_memory: catenary.Run) -> 
     )
 
 
+def test_slack_droppers_have_no_negative_zero(in_memory: catenary.Run) -> None:
+    force = in_memory.channel("dropper_force").values
+    nothing = force[force == 0.0]
+    assert nothing.size > 0 and not np.signbit(nothing).any()
+
+
 def test_several_pantographs_strips_and_wires_have_names() -> None:
     table = SCENES["overlap"]
     words = [*table["set"]]
