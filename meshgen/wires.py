@@ -267,7 +267,7 @@ class Wire(Conductor):
             inside = np.minimum(ends[:, 1], end) - np.maximum(ends[:, 0], start)
             share = np.clip(inside / (ends[:, 1] - ends[:, 0]), 0.0, 1.0)
             section -= share * lost
-            bending -= share * (1.0 - worn_bending(lost))
+            bending -= share * (1.0 - worn_round(lost).bending)
         return section, bending
 
     @property
@@ -302,14 +302,27 @@ class Wire(Conductor):
         return np.concatenate([np.zeros((3, 0)), *(piece.course for piece in self.pieces)], axis=1)
 
 
-def worn_bending(lost: float) -> float:
-    """Share left of the bending stiffness in the vertical plane of a round wire worn from below.
+class WornRound(NamedTuple):
+    """What is left of a round wire that is worn flat from below.
+
+    Attributes
+    ----------
+    bending : share left of the bending stiffness in the vertical plane [-]
+    farthest : distance of the farthest surface, the top, from the axis of bending, over the
+        radius [-]
+    """
+
+    bending: float
+    farthest: float
+
+
+def worn_round(lost: float) -> WornRound:
+    """A round wire worn from below by the share ``lost`` of its section, 0 <= lost < 1.
 
     With the half angle a of the flat, seen from the axis, the segment lost has the area
     R^2 (a - sin a cos a), and about the axis of the circle the first moment 2/3 R^3 sin^3 a and the
     second one R^4/4 (a - sin a cos a (1 - 2 sin^2 a)); what is left bends about its own centroid.
-
-    ``lost`` is the share of the section, 0 <= lost < 1.
+    That lies above the axis, but below the middle between flat and top.
     """
     low, high = 0.0, np.pi
     for _ in range(60):  # halvings, down to round-off
@@ -319,4 +332,5 @@ def worn_bending(lost: float) -> float:
     second = 0.25 * (a - np.sin(a) * np.cos(a) * (1.0 - 2.0 * np.sin(a) ** 2))
     first = 2.0 / 3.0 * np.sin(a) ** 3
     left = np.pi / 4 - second - first**2 / (np.pi - segment)
-    return float(left / (np.pi / 4))
+    raised = first / (np.pi - segment)
+    return WornRound(float(left / (np.pi / 4)), float(1.0 - raised))

@@ -95,7 +95,7 @@ def ending_as_python() -> Iterator[None]:
 def n_at_once(jobs: Any) -> int:
     """The argument ``jobs`` of a function. Raises InputError if it is no number of processes."""
     with suppress(TypeError):
-        if (n := operator.index(jobs)) >= 0:
+        if not is_truth(jobs) and (n := operator.index(jobs)) >= 0:
             return n
     raise InputError(
         f"jobs is {shown(jobs)}; it is a number of processes, or 0 for one on each core"
@@ -118,10 +118,17 @@ def listed(names: str | Sequence[str], argument: str) -> list[str]:
 
 def number_of(value: Any, argument: str) -> float:
     """The number of an argument. Raises InputError if it is none."""
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{argument} is {shown(value)}; it must be a number") from None
+    with suppress(TypeError, ValueError):
+        if not is_truth(value):
+            return float(value)
+    raise InputError(f"{argument} is {shown(value)}; it must be a number")
+
+
+def is_truth(value: Any) -> bool:
+    """Whether a value, or one of a list, is true or false, which Python takes for 1 or 0."""
+    if isinstance(value, list | tuple):
+        return any(map(is_truth, value))
+    return isinstance(value, bool) or str(getattr(value, "dtype", "")) == "bool"
 
 
 def path_of(path: Any, argument: str, wanted: str = "a path") -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 import tempfile
+from contextlib import suppress
 from hashlib import blake2b, file_digest
 from pathlib import Path
 from typing import Any, NoReturn
@@ -12,7 +13,7 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.lone_process import alone
-from catenary.callers import number_of, path_of
+from catenary.callers import is_truth, number_of, path_of
 from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.scene import Scene
@@ -133,7 +134,7 @@ class Simulation:
         (True, True)
         """
         try:
-            steps = operator.index(n)
+            steps = -1 if is_truth(n) else operator.index(n)
         except TypeError:
             steps = -1
         if steps < 0:
@@ -467,10 +468,11 @@ class Simulation:
         return ""
 
     def _add(self, name: str, value: Any) -> None:
-        try:
-            values = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{name} is {shown(value)}; it must be a number or numbers") from None
+        values = None
+        with suppress(TypeError, ValueError):
+            values = None if is_truth(value) else np.asarray(value, dtype=float)
+        if values is None:
+            raise InputError(f"{name} is {shown(value)}; it must be a number or numbers")
         own = self._own.inputs[name]
         if values.shape not in ((), own.shape):
             raise InputError(

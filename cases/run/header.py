@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from catenary.cases.process.versions import versions
@@ -85,5 +86,10 @@ def header_of(
             **cut,
             **static_datasets(at_rest.problem.line, at_rest.mesh, at_rest.form, at_rest.lift),
         },
-        facts=facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
+        # Of the wires as they hang, worn and with wrong tensions.
+        facts=facts_of(
+            replace(problem, line=at_rest.problem.line),
+            at_rest.mesh,
+            at_rest.model.dropper_lengths,
+        ),
     )

@@ -313,7 +313,11 @@ class _Line:
         return Header(
             attributes,
             {**self._latest[1], "line/evaluation_range": np.array(problem.evaluation)},
-            facts_of(problem, at_rest.mesh, at_rest.model.dropper_lengths),
+            facts_of(
+                replace(problem, line=at_rest.problem.line),
+                at_rest.mesh,
+                at_rest.model.dropper_lengths,
+            ),
         )
 
     def _datasets(self, problem: Problem, at_rest: LineAtRest) -> dict[str, np.ndarray]:

@@ -118,6 +118,11 @@ def _longest_element(source: Derivation, wire: Wire) -> float:
     return float(lengths.max(initial=(second - first).min()))
 
 
+def _lost_section(source: Derivation, wire: Wire) -> float:
+    low, high = source.problem.evaluation
+    return max((lost for start, end, lost in wire.worn if end > low and start < high), default=0.0)
+
+
 def _stiffest_dropper(source: Derivation) -> float:
     stiffest = 0.0
     for number, group in enumerate(source.problem.line.droppers):
@@ -252,6 +257,14 @@ FACTS: dict[str, Fact] = {
         _of_contacts(lambda source, wire: _or_none(wire.axial_stiffness)),
         per=WIRE,
         may_be_nan=True,
+    ),
+    "contact_wire_lost_section": Fact(
+        "-",
+        "largest share of its section that a contact wire has lost by wear in the evaluation "
+        "stretch",
+        _of_contacts(_lost_section),
+        per=WIRE,
+        high=1.0,
     ),
     "contact_wire_stiffness_damping": Fact(
         "s",

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.meshgen.slowest_wave import bends
-from catenary.meshgen.wires import Role
+from catenary.meshgen.wires import Role, worn_round
 from catenary.postproc.evaluate.statistics import (
     PantographStatistics,
     RunStatistics,
@@ -319,13 +319,16 @@ def _contact_wire_strain(run: ObservedRun) -> Observation:
     if not forces:
         return _one(math.nan, "no pantograph has statistics")
     results = run.results
-    facts = ("tension", "mass", "bending_stiffness", "axial_stiffness")
+    facts = ("tension", "mass", "bending_stiffness", "axial_stiffness", "lost_section")
     columns = [results.facts_of_wires(f"contact_wire_{name}").values() for name in facts]
     speed, strains = results.fact("speed"), []
     for wire in zip(*columns, strict=True):
-        if any(math.isnan(number) or not number > 0.0 for number in wire):
+        *known, lost = wire
+        if any(math.isnan(number) or not number > 0.0 for number in known):
             return Observation(absent="the axial or bending stiffness of the wire is not known")
-        if speed**2 * wire[1] >= wire[0]:
+        if math.isnan(lost):
+            return Observation(absent="how far the contact wire is worn is not known")
+        if speed**2 * (1.0 - lost) * wire[1] >= wire[0]:
             return Observation(absent="the train is faster than waves of the contact wire")
         strains.append(bending_strain(max(forces), speed, *wire))
     return _one(1e6 * max(strains))
@@ -338,12 +341,14 @@ def bending_strain(
     mass: float,
     bending_stiffness: float,
     axial_stiffness: float,
+    lost: float = 0.0,
 ) -> float:
     """Strain at the surface of a round wire under a force that moves along it [-].
 
     A beam under tension that travels with the force satisfies EI w'''' - (F - m v^2) w'' = 0 beside
     it, so that its curvature there is P / (2 sqrt(EI (F - m v^2))). The radius of a round wire is
-    2 sqrt(EI / EA). Droppers and supports are far off: sqrt(EI / F) is about 0.1 m.
+    2 sqrt(EI / EA). Droppers and supports are far off: sqrt(EI / F) is about 0.1 m. A worn wire has
+    less mass and bending stiffness, and its top is nearer to the axis of bending.
 
     Parameters
     ----------
@@ -354,10 +359,14 @@ def bending_strain(
     tension, mass : float
         Tension F [N] and mass m [kg/m] of the wire.
     bending_stiffness, axial_stiffness : float
-        EI [N m2] and EA [N] of the wire.
+        EI [N m2] and EA [N] of the wire, before it wears.
+    lost : float
+        Share of its section that is worn off from below [-].
     """
-    curvature = force / (2.0 * math.sqrt(bending_stiffness * (tension - mass * speed**2)))
-    return curvature * 2.0 * math.sqrt(bending_stiffness / axial_stiffness)
+    worn = worn_round(lost)
+    pull = tension - (1.0 - lost) * mass * speed**2
+    curvature = force / (2.0 * math.sqrt(worn.bending * bending_stiffness * pull))
+    return curvature * worn.farthest * 2.0 * math.sqrt(bending_stiffness / axial_stiffness)
 
 
 OBSERVED: dict[str, Observe] = {

@@ -96,7 +96,8 @@ def _one(name: str, number: float) -> Callable[[h5py.File], None]:
     def apply(file: h5py.File) -> None:
         dataset = file[name]
         values = np.array(dataset[...])
-        values.reshape(-1)[values.size // 2] = number
+        with np.errstate(over="ignore"):  # infinite in single precision
+            values.reshape(-1)[values.size // 2] = number
         dataset[...] = values
 
     return apply

@@ -532,6 +532,28 @@ def test_a_file_with_the_usual_names_needs_no_description(
 
 @pytest.mark.process
 @pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        (
+            ["force_kN"],
+            "m.csv has 2 columns of a force, force_N, force_kN: say which one is of the",
+        ),
+        (["Force_2_N"], "force_N, Force_2_N: say which one is of the pantograph by measured.force"),
+        (["head_height_m", "head_height_mm"], "2 columns of a head height, head_height_m, head_"),
+    ],
+)
+def test_several_columns_of_a_signal_are_refused_without_a_description(
+    columns: list[str], told: str, run: Path, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    file = tmp_path / "m.csv"
+    table.assign(**{name: 0.0 for name in columns}).to_csv(file, index=False)
+    done = invoke(str(run), str(file))
+    assert done.exit_code == 2, done.output
+    assert told in " ".join(done.output.split())
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
     ("description", "told"),
     [
         ("[measured]\nplace = { column = 'x' }\nforce = { column = 'F' }", 'no column "x"'),

@@ -51,6 +51,12 @@ WRONG: dict[str, tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], str]
     "sensitivity": (catenary.sensitivity, (CASE, [3]), {}, f"parameters is [3]; {NAME}"),
     "at rest": (AT_REST, (None, None), {}, f"parameters is nothing; {NAME}"),
     "speeds": (catenary.highest_speeds, (CASE, "a"), {}, 'slowest is "a"; it must be a number'),
+    "speeds, true": (
+        catenary.highest_speeds,
+        (CASE, True),
+        {},
+        "slowest is true; it must be a num",
+    ),
     "criteria": (catenary.highest_speeds, (CASE,), {"criteria": 3}, f"criteria is 3; {NAME}"),
     "separations": (catenary.separations, (CASE, None), {}, "nearest is nothing; it must be a num"),
     "optimise": (catenary.optimise, (CASE, None), {}, f"task is nothing; {FILE}"),

@@ -11,7 +11,7 @@ from measuring import check, line_alone, release, step
 from small_lines import BARE, EN_CONTACT_WIRE, bare_wires, mesh_of, numerics, problem_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.meshgen.wires import worn_bending
+from catenary.meshgen.wires import worn_round
 from catenary.solver.problem.defects import Defect, HardSpot, WornWire
 from catenary.solver.statics.form_finding.equilibrium import find_form
 from catenary.solver.waves.scattering import change_of_wire, scattered
@@ -89,7 +89,7 @@ def test_the_begin_of_a_worn_stretch(lost: float) -> None:
     worn = replace(
         EN_CONTACT_WIRE,
         mass_per_length=(1.0 - lost) * EN_CONTACT_WIRE.mass_per_length,
-        bending_stiffness=worn_bending(lost) * EN_CONTACT_WIRE.bending_stiffness,
+        bending_stiffness=worn_round(lost).bending * EN_CONTACT_WIRE.bending_stiffness,
     )
     returned, _ = change_of_wire(EN_CONTACT_WIRE, worn, OMEGA)
     check("|R|", found, np.abs(returned), within=1e-4)

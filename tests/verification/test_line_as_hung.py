@@ -13,7 +13,7 @@ from static_line import absolute_rest, first_rest
 
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.meshgen.wires import worn_bending
+from catenary.meshgen.wires import worn_round
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model import beam
 from catenary.solver.model.builder import ModelBuilder
@@ -166,7 +166,7 @@ def test_a_worn_stretch_is_lighter_and_softer() -> None:
         dofs, length = changed.wire_elements(wire)
         x = mesh.x(pairs)
         inside = np.clip(np.minimum(x[:, 1], 97.1) - np.maximum(x[:, 0], 60.3), 0.0, None) / length
-        left = 1.0 - inside * (1.0 - worn_bending(0.2)) * (wire == CONTACT_WIRE)
+        left = 1.0 - inside * (1.0 - worn_round(0.2).bending) * (wire == CONTACT_WIRE)
         bent = left[:, None, None] * beam.stiffness(length, data.bending_stiffness, 0.0)
         for own, matrix in zip(dofs, bent + beam.stiffness(length, 0.0, data.tension),
                                strict=True):  # fmt: skip
@@ -203,7 +203,11 @@ def test_bending_of_a_wire_worn_flat_from_below(depth: float) -> None:
         for n in range(3)
     )
     expected = (second - first**2 / area) / (np.pi / 4)
-    check("left of EI", worn_bending(1.0 - area / np.pi), expected, within=1e-7)
+    worn = worn_round(1.0 - area / np.pi)
+    check("left of EI", worn.bending, expected, within=1e-7)
+    # The flat, at depth - 1, is nearer to the centroid than the top.
+    farthest = max(1.0 - first / area, first / area - (depth - 1.0))
+    check("surface over the radius", worn.farthest, farthest, within=1e-7)
 
 
 def test_a_hard_spot_hangs_on_the_wire_and_stands_still_on_its_spring() -> None:

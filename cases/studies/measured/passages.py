@@ -181,11 +181,12 @@ def usual_description(table: pd.DataFrame, path: Path) -> Description:
     Raises
     ------
     InputError
-        If it lacks one that is needed.
+        If it lacks one that is needed, or has several of a signal.
     """
     measured = {}
     for key, names in _USUAL.items():
         there = [name for name in names if name in table]
+        _refuse_several(table, path, key, there)
         if there and not (key == "time" and "place" in measured):
             measured[key] = {"column": there[0], "unit": names[there[0]]}
     if "force" not in measured or len(measured.keys() & {"place", "time"}) != 1:
@@ -194,6 +195,24 @@ def usual_description(table: pd.DataFrame, path: Path) -> Description:
             "its columns with --description"
         )
     return checked_table({"measured": measured}, Description, str(path))
+
+
+def _refuse_several(table: pd.DataFrame, path: Path, key: str, there: list[str]) -> None:
+    """Raise InputError if a table has further columns of a signal beside the usual one.
+
+    Two columns of one name are left to `column_of`, whose second pandas names with a point.
+    """
+    if not there or key not in ("force", "head_height"):
+        return
+    named = [name for name in map(str, table.columns) if name.lower().startswith(key)]
+    several = [name for name in named if not name.startswith(f"{there[0]}.")]
+    if len(several) > 1:
+        rest = ", and by [[others]] whose the others are" if key == "force" else ""
+        raise InputError(
+            f"{path} has {len(several)} columns of a {key.replace('_', ' ')}, "
+            f"{', '.join(plain(name, 40) for name in several[:12])}: say which one is of the "
+            f"pantograph by measured.{key}.column in a description, given with --description{rest}"
+        )
 
 
 def passage_of(

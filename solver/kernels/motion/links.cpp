@@ -47,7 +47,8 @@ void forces_within(const Motion& motion, const Links& links, int64_t begin, int6
     reserves_within(motion, links, begin, end, result);
     for (int64_t link = begin; link < end; ++link) {
         const Reserve& law = links.law[link];
-        result[link] *= result[link] < 0.0 ? law.carried - law.released : law.carried;
+        const double share = result[link] < 0.0 ? law.carried - law.released : law.carried;
+        result[link] = share * result[link] + 0.0;  // no negative zero, as of a slack dropper
     }
 }
 

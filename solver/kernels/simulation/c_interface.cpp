@@ -79,6 +79,6 @@ size_t catenary_state_size(const catenary_simulation* simulation) {
 void catenary_save(const catenary_simulation* simulation, void* state) {
     simulation->own.save(static_cast<std::byte*>(state));
 }
-void catenary_restore(catenary_simulation* simulation, const void* state) {
-    simulation->own.restore(static_cast<const std::byte*>(state));
+int catenary_restore(catenary_simulation* simulation, const void* state) {
+    return simulation->own.restore(static_cast<const std::byte*>(state)) ? 0 : 1;
 }

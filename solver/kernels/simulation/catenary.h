@@ -63,10 +63,12 @@ CATENARY_API const double* catenary_contact_force(const catenary_simulation* sim
 CATENARY_API const double* catenary_head_height(const catenary_simulation* simulation);
 CATENARY_API const double* catenary_wire_height(const catenary_simulation* simulation);
 
-/* Keep the state in memory of `catenary_state_size` bytes, and come back to it. */
+/* Keep the state in memory of `catenary_state_size` bytes, and come back to it. A state that this
+ * file has not, or whose bytes were changed, is refused with a value other than 0; the simulation
+ * stays where it is. */
 CATENARY_API size_t catenary_state_size(const catenary_simulation* simulation);
 CATENARY_API void catenary_save(const catenary_simulation* simulation, void* state);
-CATENARY_API void catenary_restore(catenary_simulation* simulation, const void* state);
+CATENARY_API int catenary_restore(catenary_simulation* simulation, const void* state);
 
 #ifdef __cplusplus
 }

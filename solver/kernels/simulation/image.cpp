@@ -48,11 +48,13 @@ class FileInput {
         check_.take(data, n);
     }
     size_t left() const { return left_; }
-    void end() {
+    /// Returns the sum of what was read.
+    uint64_t end() {
         const uint64_t expected = check_.sum();
         uint64_t sum;
         get(&sum, sizeof sum);
         if (sum != expected) throw std::runtime_error("it is damaged");
+        return sum;
     }
 
   private:
@@ -107,8 +109,8 @@ void write_image(const std::string& path, const std::string& header, const std::
     output.end();
 }
 
-std::string read_image(const std::string& path, const std::string& header,
-                       std::vector<OwnBlock>& blocks) {
+ImageText read_image(const std::string& path, const std::string& header,
+                     std::vector<OwnBlock>& blocks) {
     FileInput input(path);
     std::string found(header.size(), '\0');
     if (input.left() < header.size()) throw std::runtime_error("it ends too early");
@@ -133,8 +135,8 @@ std::string read_image(const std::string& path, const std::string& header,
         input.get(bytes, own.size);
         blocks.push_back({std::move(memory), {bytes, own.size}, own.changes != 0});
     }
-    input.end();
-    return text;
+    const uint64_t sum = input.end();
+    return {std::move(text), sum};
 }
 
 }  // namespace catenary

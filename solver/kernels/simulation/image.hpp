@@ -191,10 +191,15 @@ class ImageReader {
 /// std::runtime_error if it cannot be written.
 void write_image(const std::string& path, const std::string& header, const std::string& text,
                  const std::vector<MemoryBlock>& blocks);
+/// Bytes of such a file, and its checksum.
+struct ImageText {
+    std::string bytes;
+    uint64_t sum;
+};
 /// Read such a file, which begins with this header; returns the bytes and fills in the blocks.
 /// Throws std::runtime_error if it cannot be read, has another header, or was damaged.
-std::string read_image(const std::string& path, const std::string& header,
-                       std::vector<OwnBlock>& blocks);
+ImageText read_image(const std::string& path, const std::string& header,
+                     std::vector<OwnBlock>& blocks);
 
 /// Write a record.
 template <class T>
@@ -206,12 +211,14 @@ void write_record(const std::string& path, const std::string& header, T& record)
     visit(writer, record);
     write_image(path, header, writer.text(), blocks);
 }
-/// Read it, with the memory of its arrays.
+/// Read it, with the memory of its arrays; returns the checksum of the file.
 template <class T>
-void read_record(const std::string& path, const std::string& header, T& record,
-                 std::vector<OwnBlock>& blocks) {
-    ImageReader reader(read_image(path, header, blocks), blocks);
+uint64_t read_record(const std::string& path, const std::string& header, T& record,
+                     std::vector<OwnBlock>& blocks) {
+    ImageText text = read_image(path, header, blocks);
+    ImageReader reader(std::move(text.bytes), blocks);
     visit(reader, record);
+    return text.sum;
 }
 
 }  // namespace catenary

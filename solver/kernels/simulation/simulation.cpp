@@ -75,7 +75,7 @@ struct Simulation::Place {
 
 Simulation::Simulation(const std::string& path) {
     try {
-        read_record(path, header(), line_, blocks_);
+        file_sum_ = read_record(path, header(), line_, blocks_);
         make_steps();
     } catch (const std::runtime_error& error) {
         throw std::runtime_error(path + ": " + error.what());
@@ -112,6 +112,7 @@ void Simulation::make_steps() {
     steps_.emplace(parts, block);
     state_size_ = sizeof(Place) + inputs_.size() * sizeof(Input);
     for (const OwnBlock& own : blocks_) state_size_ += own.changes ? own.bytes.size() : 0;
+    state_size_ += sizeof(uint64_t);
 }
 
 Simulation::Outcome Simulation::step(int64_t n) {
@@ -170,7 +171,16 @@ bool Simulation::set_speed(double speed) {
     return true;
 }
 
+/// Checksum of a state of this file without its last bytes.
+uint64_t Simulation::sum_of(const std::byte* state) const {
+    CheckSum check;
+    check.take(&file_sum_, sizeof file_sum_);
+    check.take(state, state_size_ - sizeof(uint64_t));
+    return check.sum();
+}
+
 void Simulation::save(std::byte* state) const {
+    std::byte* const start = state;
     auto put = [&](const void* from, size_t n) {
         std::memcpy(state, from, n);
         state += n;
@@ -180,9 +190,14 @@ void Simulation::save(std::byte* state) const {
     put(inputs_.data(), inputs_.size() * sizeof(Input));
     for (const OwnBlock& own : blocks_)
         if (own.changes) put(own.bytes.data(), own.bytes.size());
+    const uint64_t sum = sum_of(start);
+    put(&sum, sizeof sum);
 }
 
-void Simulation::restore(const std::byte* state) {
+bool Simulation::restore(const std::byte* state) {
+    uint64_t sum;
+    std::memcpy(&sum, state + state_size_ - sizeof sum, sizeof sum);
+    if (sum != sum_of(state)) return false;
     auto get = [&](void* to, size_t n) {
         std::memcpy(to, state, n);
         state += n;
@@ -195,6 +210,7 @@ void Simulation::restore(const std::byte* state) {
     get(inputs_.data(), inputs_.size() * sizeof(Input));
     for (OwnBlock& own : blocks_)
         if (own.changes) get(own.bytes.data(), own.bytes.size());
+    return true;
 }
 
 }  // namespace catenary

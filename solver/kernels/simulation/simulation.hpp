@@ -105,14 +105,17 @@ class Simulation {
     const TrainOutputs& outputs() const { return line_.steps.train_outputs; }
     int64_t n_steps_left() const { return line_.ahead.drives.n - (n_done_ - line_.ahead.n_done); }
 
-    /// A state to come back to, and how large one is.
+    /// A state to come back to, and how large one is. Its last bytes are a checksum of the others
+    /// and of the file: indices in it are not checked otherwise.
     size_t state_size() const { return state_size_; }
     void save(std::byte* state) const;
-    void restore(const std::byte* state);
+    /// Come back to a state; false, and nothing changes, if it is none of this file or was damaged.
+    bool restore(const std::byte* state);
 
   private:
     struct Place;
     void make_steps();
+    uint64_t sum_of(const std::byte* state) const;
     Outcome take_one();
     bool has_turned() const;
     void drive_next();
@@ -130,6 +133,7 @@ class Simulation {
     int64_t n_done_ = 0;
     Outcome latest_ = Outcome::kDone;
     size_t state_size_ = 0;
+    uint64_t file_sum_ = 0;
 };
 
 }  // namespace catenary

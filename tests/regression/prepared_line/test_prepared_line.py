@@ -236,6 +236,18 @@ def test_damaged_files_are_refused_in_a_sentence(line: Path, tmp_path: Path) -> 
             Simulation(str(tmp_path / name))
 
 
+def test_c_program_is_refused_states_that_are_damaged_or_of_another_line(
+    line: Path, tmp_path: Path
+) -> None:
+    """Of some hundred damaged states none is taken, nor that of a line as large."""
+    program = compiled(Path(__file__).with_name("damaged_states.c"), tmp_path / "states")
+    prepare_line(
+        acting_scene("ac_simple", ["line.contact_wire.tension_N=21e3"]), tmp_path / "b.line"
+    )
+    done = subprocess.run([program, line, tmp_path / "b.line"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "0 1 0 0.020 0.010\n")
+
+
 def test_line_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     with pytest.raises(RunBroken, match="cannot be written"):
         prepare_line(acting_scene("ac_simple"), tmp_path / "no/a.line")

@@ -108,7 +108,7 @@ def test_one_name_stands_for_a_list_of_one(scene: catenary.Scene) -> None:
     assert catenary.sensitivity(scene, key).parameter.tolist() == [key]
 
 
-@pytest.mark.parametrize("jobs", [-1, 1.5, "2"])
+@pytest.mark.parametrize("jobs", [-1, 1.5, "2", True])
 @pytest.mark.parametrize(
     "ask",
     [

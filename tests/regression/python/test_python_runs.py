@@ -6,6 +6,7 @@ import copy
 import gc
 import json
 import logging
+import math
 import os
 import pickle
 import signal
@@ -215,6 +216,12 @@ def test_droppers_and_arms_are_those_of_the_summary(in_memory: catenary.Run) -> 
     )
 
 
+def test_slack_droppers_have_no_negative_zero(in_memory: catenary.Run) -> None:
+    force = in_memory.channel("dropper_force").values
+    nothing = force[force == 0.0]
+    assert nothing.size > 0 and not np.signbit(nothing).any()
+
+
 def test_several_pantographs_strips_and_wires_have_names() -> None:
     table = SCENES["overlap"]
     words = [*table["set"]]
@@ -227,6 +234,33 @@ def test_several_pantographs_strips_and_wires_have_names() -> None:
     for name in names:
         apart = np.abs(total.sel(pantograph=name) - run.force.sel(pantograph=name)).max()
         assert float(apart) < 1e-12 * float(run.force.max())
+
+
+def test_wires_are_judged_as_they_hang(scene: catenary.Scene) -> None:
+    """A contact wire that has lost half of its section, at nine tenths of its tension."""
+    worn = {"type": "worn_wire", "wire": "contact_wire", "lost_share": 0.5}
+    worn |= {"from_m": scene["evaluation.from_m"], "to_m": scene["evaluation.to_m"]}
+    hanging = scene.replace(
+        {
+            "line.contact_wire.axial_stiffness_N": 18e6,
+            "evaluation.rules": ["line"],
+            "evaluation.limits.contact_wire_strain_um_per_m": 400.0,
+            "evaluation.limits.contact_wire_tension_N": 19e3,
+            "defects": [worn, {"type": "wrong_tension", "wire": "contact_wire", "factor": 0.9}],
+        }
+    )
+    with catenary.run(hanging) as run:
+        found = run.verdict.set_index("rule").value
+        force = float((run.statistics.mean_N + 3 * run.statistics.std_N).max())
+    tension = 0.9 * scene["line.contact_wire.tension_N"]
+    assert found["contact_wire_tension"] == pytest.approx(tension, rel=1e-12)
+    # EI of a half round is R^4 (pi / 8 - 8 / 9 pi) E; its top is 1 - 4 / 3 pi of R above its axis.
+    bending = scene["line.contact_wire.bending_stiffness_N_m2"]
+    half = bending * (math.pi / 8 - 8 / (9 * math.pi)) / (math.pi / 4)
+    moving = 0.5 * scene["line.contact_wire.mass_kg_per_m"] * (scene["train.speed_km_h"] / 3.6) ** 2
+    curvature = force / (2 * math.sqrt(half * (tension - moving)))
+    top = (1 - 4 / (3 * math.pi)) * 2 * math.sqrt(bending / 18e6)
+    assert found["contact_wire_strain"] == pytest.approx(1e6 * curvature * top, rel=1e-9)
 
 
 def test_a_run_knows_its_scene(in_memory: catenary.Run, scene: catenary.Scene) -> None:

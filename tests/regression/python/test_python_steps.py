@@ -163,6 +163,8 @@ def test_what_is_set_acts_from_the_next_step_on(name: str, scene: catenary.Scene
     [
         (np.nan, "must be finite"),
         ("5 N", 'lift_force is "5 N"; it must be a number or numbers'),
+        (True, "lift_force is true; it must be a number or numbers"),
+        ([np.True_], "it must be a number or numbers"),
         ([np.inf], "must be finite"),
         ([1.0, 2.0], r"shape \(2,\); it must be a number, or one of each of 1"),
         (np.zeros((1, 1)), "shape"),
@@ -175,7 +177,7 @@ def test_what_cannot_be_set_is_refused(value: Any, says: str, scene: catenary.Sc
 
 def test_speeds_that_cannot_be_are_refused(scene: catenary.Scene) -> None:
     with catenary.Simulation(scene) as sim:
-        for word in ("fast", None):
+        for word in ("fast", None, True, np.True_):
             with pytest.raises(catenary.InputError, match="speed is .*must be a number"):
                 sim.speed = word  # type: ignore[assignment]
         for speed in (-1.0, np.nan, np.inf):
@@ -201,7 +203,7 @@ def test_a_loop_that_looks_at_no_answer_ends(scene: catenary.Scene) -> None:
             while sim.time < 1e6:
                 sim.step(100)
         assert sim.step(0) and sim.steps_left == 0
-        for n in (-1, 1.0, np.float64(3), "2", None):
+        for n in (-1, 1.0, np.float64(3), "2", None, True):
             with pytest.raises(catenary.InputError, match="whole number of steps, at least 0"):
                 sim.step(n)  # type: ignore[arg-type]
 

@@ -116,6 +116,24 @@ def test_damping_of_a_component_goes_before_that_of_the_line(
     assert found["contact_wire_mass_damping"] == 0.0125
 
 
+def test_the_most_worn_place_of_the_evaluation_stretch_is_a_fact(
+    problem: Problem, derived: Any
+) -> None:
+    low, high = problem.evaluation
+    worn = (
+        (low - 50.0, low - 1.0, 0.3),
+        (low + 5.0, low + 9.0, 0.1),
+        (high - 2.0, high + 9.0, 0.2),
+    )
+    wires = tuple(
+        replace(wire, worn=worn) if wire.name == CONTACT_WIRE else wire
+        for wire in problem.line.wires
+    )
+    line = replace(problem.line, wires=wires)
+    assert derived(problem)["contact_wire_lost_section"] == 0.0
+    assert derived(replace(problem, line=line))["contact_wire_lost_section"] == 0.2
+
+
 def test_what_is_not_simulated_is_no_fact(problem: Problem, derived: Any) -> None:
     """Neither damping nor the stiffness of slack droppers that the scene leaves out."""
     assert derived(problem)["slack_stiffness_share"] == 0.0

@@ -189,6 +189,7 @@ def strain_of(**changes: float) -> Any:
         "contact_wire_mass": 1.07,
         "contact_wire_bending_stiffness": 137.0,
         "contact_wire_axial_stiffness": 1.4e7,
+        "contact_wire_lost_section": 0.0,
         "speed": 70.0,
         **changes,
     }
@@ -206,7 +207,22 @@ def test_strain_is_judged_where_its_data_are_known() -> None:
     unknown = "the axial or bending stiffness of the wire is not known"
     assert strain_of(contact_wire_axial_stiffness=math.nan).absent == unknown
     assert strain_of(contact_wire_bending_stiffness=0.0).absent == unknown
+    unknown = "how far the contact wire is worn is not known"
+    assert strain_of(contact_wire_lost_section=math.nan).absent == unknown
     assert strain_of(speed=137.0).absent == "the train is faster than waves of the contact wire"
+
+
+def test_strain_of_a_worn_wire_is_that_of_its_section() -> None:
+    """A half round: EI is R^4 (pi / 8 - 8 / 9 pi) E, its top 1 - 4 / 3 pi of R above its axis."""
+    radius, bending, tension, mass, speed = 6.2e-3, 137.0, 20e3, 1.07, 70.0
+    half = bending * (math.pi / 8 - 8 / (9 * math.pi)) / (math.pi / 4)
+    curvature = 250.0 / (2 * math.sqrt(half * (tension - 0.5 * mass * speed**2)))
+    expected = 1e6 * curvature * (1 - 4 / (3 * math.pi)) * radius
+    axial = 4 * bending / radius**2
+    worn = strain_of(contact_wire_axial_stiffness=axial, contact_wire_lost_section=0.5).values[""]
+    assert worn == pytest.approx(expected, rel=1e-9)
+    new = strain_of(contact_wire_axial_stiffness=axial).values[""]
+    assert 1.4 * new < worn < 1.6 * new
 
 
 def test_tension_is_the_largest_at_ends_of_contact_wires() -> None:
