@@ -25,7 +25,11 @@ def surface_samples(model: Model) -> tuple[np.ndarray, np.ndarray]:
     wires = model.problem.line.wires_of(Role.CONTACT)
     parts = [np.zeros(0, dtype=SAMPLE)]
     for wire in wires if shapes else ():
-        x = np.unique(np.concatenate([shape.places(PER_WAVE) for shape in shapes]))
+        # Beyond the samples of a wire its surface is level at 0: one that stays at another height
+        # has samples to the wire's ends.
+        ends = model.mesh.x(model.mesh.wires[wire.name])[[0, -1]]
+        stays = ends[sum(shape.at(wire.name, ends)[0] for shape in shapes) != 0.0]
+        x = np.unique(np.concatenate([stays, *(shape.places(PER_WAVE) for shape in shapes)]))
         samples = np.zeros(x.size, dtype=SAMPLE)
         samples["x"] = x
         for shape in shapes:

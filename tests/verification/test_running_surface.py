@@ -87,6 +87,31 @@ def test_the_surface_is_what_was_wanted_at_every_place() -> None:
     check("slope [-]", steep[apart], sum(p[1] for p in parts)[apart], within=2e-5)
 
 
+def test_heights_given_by_place_stay_beyond_their_ends() -> None:
+    """As the document of ``by_place`` says: a head does not fall off the last of them."""
+    table = ((20.0, 1e-3), (25.0, -4e-4), (30.0, 2e-3))
+    sound = problem_of(bare_wires(60.0), WAVY)
+    flat = find_form(sound, mesh_of(sound.line, 60))
+    smooth = ContactWires(*flat, distribute(flat[0], 1, 0))
+    x = np.array([0.0, 7.3, 20.0 - 1e-6, 20.0, 25.0, 30.0, 30.0 + 1e-6, 44.4, 60.0])
+    wanted = np.array([1e-3] * 4 + [-4e-4] + [2e-3] * 4)
+    # Round-off of heights of 5.5 m. A kink is followed to 16 decay lengths, where its slope is
+    # 1.1e-9; a cubic from there over the 18 m to the heights is off by 4/27 of 18 m times that.
+    for kinks, within in ((), 1e-14), ((Kink(CONTACT_WIRE, 50.0, 0.02),), 4e-9):
+        problem = problem_of(
+            bare_wires(60.0),
+            WAVY,
+            irregularities=Irregularities(surface=Heights((0.0, 60.0), None, table)),
+            defects=kinks,
+        )
+        model, form = find_form(problem, mesh_of(problem.line, 60))
+        wires = ContactWires(model, form, distribute(model, 1, 0))
+        check("height [m]", wires.rest_height(x) - smooth.rest_height(x), wanted, within=within)
+        # The spline turns by 5.2e-4 1/m at its ends: slopes 1e-6 m from there are below 1e-9.
+        level = x != 25.0
+        check("slope [-]", wires.rest_slope(x)[level], smooth.rest_slope(x)[level], within=2e-9)
+
+
 def test_a_kink_of_a_worn_wire_straightens_over_less() -> None:
     """Its depth is angle / 2 sqrt(EI / F) of what is left: of 30 % lost from below 0.34 of EI."""
     worn = WornWire(CONTACT_WIRE, 25.0, 35.0, 0.3)
