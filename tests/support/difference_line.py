@@ -238,7 +238,9 @@ class DifferenceLine:
             time = step * dt
             if step % _LOOK_EVERY == 0 and m < self.size:
                 nearly = self._points_up_to(front - _WAY)
-                if step == 0 or np.abs(every[0][nearly:m]).max() > _AT_REST:
+                # A pantograph that does not touch yet moves nothing.
+                is_near = float(x.max()) + data.speed * time > front - 2.0 * _WAY
+                if step == 0 or is_near or np.abs(every[0][nearly:m]).max() > _AT_REST:
                     front += 3.0 * _WAY
                     m = self._points_up_to(front)
                     matrix = self.stiffness[:m, :m].todia()
