@@ -36,28 +36,6 @@ from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 
 
-def room_for(k: int) -> native.Room:
-    """Room to solve for up to k unknowns."""
-    acting, order = np.zeros((2, k), dtype=np.int64)
-    left, change = np.zeros((2, k))
-    acts, before = np.zeros((2, k), dtype=bool)
-    n = k // 2 + 1
-    counts = np.zeros((4, n), dtype=np.int64)
-    path = native.PathRoom(np.zeros((n, n)), np.zeros((7, n)), counts, np.zeros(n, dtype=bool))
-    needs, excludes = np.zeros((2, k, k), dtype=bool)
-    pivoting = native.PivotRoom(
-        needs,
-        excludes,
-        turned=np.zeros(20 * k + 100, dtype=np.int64),
-        partly=np.zeros((k, k)),
-        numbers=np.zeros((4, k)),
-        counts=np.zeros((2, k), dtype=np.int64),
-        marks=np.zeros((3, k), dtype=bool),
-        path=path,
-    )
-    return native.Room(np.zeros((k, k)), acting, order, left, change, acts, before, pivoting)
-
-
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
 _MAX_ROUNDS = 30
 # Message of a step that holds NaN or infinity.
@@ -240,6 +218,6 @@ class InnerProblem:
         always[:n] = self.law.pulls
         behind = np.zeros(size, dtype=np.int64)
         right, solution = np.zeros((2, size))
-        matrix, room = np.zeros((size, size)), room_for(size)
+        matrix, room = np.zeros((size, size)), native.Room(size)
         self.unknowns = native.Unknowns(always, behind, matrix, right, solution, room)
         self._bound_to = None, None

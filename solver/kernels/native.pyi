@@ -97,13 +97,10 @@ NewmarkFactors = namedtuple(
 )
 PassArrays = namedtuple("PassArrays", "factor, velocity, loads, answer, motion, known, predicted")
 PassParts = namedtuple("PassParts", "layouts, station_types, rows, factors, arrays, changes")
-PathRoom = namedtuple("PathRoom", "columns, numbers, counts, all")
-PivotRoom = namedtuple("PivotRoom", "needs, excludes, turned, partly, numbers, counts, marks, path")
 ProductArrays = namedtuple("ProductArrays", "kinds, blocks, first, sections")
 ReducedMechanism = namedtuple("ReducedMechanism", "tables, weight, zero")
 Regulation = namedtuple("Regulation", "settings, gains, memory, waiting")
 ReportedForces = namedtuple("ReportedForces", "gamma, from_time, latest, reported")
-Room = namedtuple("Room", "factors, acting, order, left, change, acts, before, pivoting")
 Sampled = namedtuple("Sampled", "loads, times, places, samples")
 Sections = namedtuple("Sections", "starts, station_type")
 Share = namedtuple("Share", "flags, present, line, rows, bounds")
@@ -273,6 +270,11 @@ solve: Kernel
 MOST_TANGENTS: int
 linearise: Kernel
 remember: Kernel
+
+class Room:
+    """Room to solve the small problem of a step for so many unknowns."""
+
+    def __init__(self, most: int) -> None: ...
 
 class Layout:
     """How the unknowns of a station stand in vectors, and which products blocks of such rows or

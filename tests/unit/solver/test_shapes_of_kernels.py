@@ -16,7 +16,7 @@ from repeating_line import layout, line, station_factors, station_product
 from catenary.mbs.interface import affine
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.line_response import LineResponse
-from catenary.solver.contact_problem.complementarity import InnerProblem, room_for
+from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import LinearLaw
@@ -36,7 +36,7 @@ def system(m: int) -> tuple[object, ...]:
     """A system of m unknowns, their signs, a bound of rounds, room."""
     made = SimpleNamespace(matrix=np.eye(m), right=np.ones(m), solution=np.zeros(m))
     signs = SimpleNamespace(always=np.zeros(m, dtype=bool), behind=np.zeros(m, dtype=np.int64))
-    return made, signs, 9, room_for(m)
+    return made, signs, 9, native.Room(m)
 
 
 # Calls in which no array may be shorter, along any axis, than it is.
