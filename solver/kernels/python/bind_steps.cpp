@@ -43,7 +43,8 @@ class HeldSimulation : public Simulation {
         std::memcpy(state.data() + state_size(), &sum, sizeof sum);
         return state;
     }
-    void go_back(const std::string& state) {
+    void go_back(const py::bytes& saved) {
+        const std::string state = saved;
         uint64_t sum = 0;
         if (state.size() == state_size() + sizeof sum)
             std::memcpy(&sum, state.data() + state_size(), sizeof sum);
