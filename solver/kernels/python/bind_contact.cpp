@@ -47,7 +47,7 @@ bool find_zero_of(const py::function& of, std::span<double> z, double width, dou
 
 void offer_contact(py::module_& module) {
     offer_records<Wires, Answers, Gains, Followed, ContactWork, Sideways, Across, Contacts, Leads,
-                  TrainPlaces, StripEnds, Affine, Bounds, Share>(module);
+                  TrainPlaces, StripEnds, Affine, Bounds, LinkRows, Share>(module);
     offer_records<Tangents, ReportedForces, StepLaw, Coupled, System, Signs, Unknowns, Depths,
                   SmallProblem>(module);
     py::class_<Room>(module, "Room", "Room to solve for so many unknowns.")

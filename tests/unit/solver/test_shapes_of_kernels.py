@@ -28,7 +28,7 @@ def small_problem() -> object:
     """A small problem of two contacts without links, as kernels solve it."""
     heads, response = affine(np.zeros(12), 2), LineResponse(2, 0)
     inner = InnerProblem(LinearInSteps(LinearLaw(5e4, 0.0), 2, pulls=False), no_links())
-    problem, rows = inner.problem(heads, response), SimpleNamespace(numbers=response.sent_rows)
+    problem, rows = inner.problem(heads, response), SimpleNamespace(numbers=response.rows.numbers)
     return problem._replace(share=SimpleNamespace(**response.share._asdict() | {"rows": rows}))
 
 
