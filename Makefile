@@ -181,6 +181,7 @@ links:
 	    [ "$$(readlink $$link)" = ../../../$$part ] || ln -sfn ../../../$$part $$link; done
 
 mypy: links
+	@$(PYTHON) .setup/kernel_types.py
 	MYPYPATH=build/typing $(PYTHON) -m mypy --exclude '/(cases/api|solver/base)/' -p catenary
 	@# Benchmarks run by themselves only: this sees when what they call has gone.
 	MYPYPATH=build/typing:tests/support:tests/benchmarks/drivers $(PYTHON) -m mypy --allow-untyped-defs \
@@ -192,5 +193,5 @@ format: setup-tests ## bring all files into the format of ruff and clang-format
 	.venv/bin/clang-format -i $(KERNELS)
 
 clean: ## remove what can be made again, results and .venv excepted
-	rm -rf build solver/kernels/*.so *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf build solver/kernels/*.so solver/kernels/native.pyi *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

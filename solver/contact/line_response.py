@@ -5,42 +5,13 @@ What travels between ranks stands in two arrays of numbers; Python takes named v
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from catenary.mbs.interface import affine
-from catenary.solver.kernels.native import FLAGS, Bounds, Share
+from catenary.solver.kernels.native import FLAGS, Bounds, LinkRows, Share
 
 # Numbers that add up over ranks besides answers.
 N_FLAGS = FLAGS.itemsize // 8
-
-
-class Rows(NamedTuple):
-    """Links that may switch, and their coupling to n contacts.
-
-    Attributes
-    ----------
-    numbers : (capacity, 2 + 3 n) all of the following, a row for each link, for kernels
-    number : (capacity,) number of the link
-    reserve : (capacity,) reserve of the link without contact forces [N]
-    reaction : (capacity, n) change of the reserve by a unit force at each contact [-]
-    lift, rise : (capacity, n) decrease of wire height [m/N] and of its rate [m/(N s)] at each
-        contact by a unit compensation of the link
-    """
-
-    numbers: np.ndarray
-    number: np.ndarray
-    reserve: np.ndarray
-    reaction: np.ndarray
-    lift: np.ndarray
-    rise: np.ndarray
-
-
-def rows_of(numbers: np.ndarray, n: int) -> Rows:
-    """Views of ``numbers`` (capacity, 2 + 3 n) for n contacts."""
-    couplings = (numbers[:, 2 + k * n : 2 + (k + 1) * n] for k in range(3))
-    return Rows(numbers, numbers[:, 0], numbers[:, 1], *couplings)
 
 
 class LineResponse:
@@ -53,8 +24,7 @@ class LineResponse:
     present : (n,) 1 for contacts whose wire is on the strip, else 0; the same on all ranks
     early_height, early_rate : (n,) wire heights [m] and rates [m/s] extrapolated from the line's
         motion; (0,) without ``early``
-    sent_rows : (capacity, 2 + 3 n) numbers of ``rows``
-    rows : Rows, its views
+    rows : ``native.LinkRows``, whose ``numbers`` (capacity, 2 + 3 n) are sent
     share : Share, all this as kernels take it
     bounds : Bounds; kept by reference
 
@@ -80,8 +50,7 @@ class LineResponse:
             self.summed, np.cumsum(sizes)[:-1]
         )
         self.line = affine(answers, n)
-        self.sent_rows = np.zeros((capacity, 2 + 3 * n))
-        self.rows = rows_of(self.sent_rows, n)
+        self.rows = LinkRows(np.zeros((capacity, 2 + 3 * n)))
         self.present = np.ones(n)
         self.bounds = bounds or Bounds(*(np.full(size, np.inf) for size in (n, n, 1)))
         self.share = Share(flags.view(FLAGS), self.present, self.line, self.rows, self.bounds)
@@ -109,4 +78,4 @@ class LineResponse:
     @property
     def links(self) -> np.ndarray:
         """Numbers of the links with a row (m,)."""
-        return self.rows.number[: self.count].astype(np.int64)
+        return self.rows.numbers[: self.count, 0].astype(np.int64)

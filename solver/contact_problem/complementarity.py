@@ -35,29 +35,6 @@ from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 
-
-def room_for(k: int) -> native.Room:
-    """Room to solve for up to k unknowns."""
-    acting, order = np.zeros((2, k), dtype=np.int64)
-    left, change = np.zeros((2, k))
-    acts, before = np.zeros((2, k), dtype=bool)
-    n = k // 2 + 1
-    counts = np.zeros((4, n), dtype=np.int64)
-    path = native.PathRoom(np.zeros((n, n)), np.zeros((7, n)), counts, np.zeros(n, dtype=bool))
-    needs, excludes = np.zeros((2, k, k), dtype=bool)
-    pivoting = native.PivotRoom(
-        needs,
-        excludes,
-        turned=np.zeros(20 * k + 100, dtype=np.int64),
-        partly=np.zeros((k, k)),
-        numbers=np.zeros((4, k)),
-        counts=np.zeros((2, k), dtype=np.int64),
-        marks=np.zeros((3, k), dtype=bool),
-        path=path,
-    )
-    return native.Room(np.zeros((k, k)), acting, order, left, change, acts, before, pivoting)
-
-
 # Mostly one or two rounds are needed; a set that cycles shows within a few.
 _MAX_ROUNDS = 30
 # Message of a step that holds NaN or infinity.
@@ -88,47 +65,6 @@ class InnerSolution(NamedTuple):
     complete: bool = True
 
 
-class Gap:
-    """Depths and rates at n contacts as functions of contact forces and compensations.
-
-    Attributes
-    ----------
-    affine : Affine of depths [m], their rates [m/s] without forces, and what forces take off them
-    found : Depths under the forces looked at last
-    line : whose answers these are
-    """
-
-    def __init__(self, n: int) -> None:
-        self.affine = affine(np.zeros(2 * n * (1 + n)), n)
-        self.found = native.Depths(*np.zeros((2, n)))
-        self.line = LineResponse(n, 0)
-
-    def put(self, line: LineResponse, heads: Heads) -> None:
-        """Take the answers of both sides for this step.
-
-        Raises
-        ------
-        RunBroken
-            If one of them is no number; it would compare as out of contact and go unnoticed.
-        """
-        self.line = line
-        if not native.subtract(heads.affine, line.line, line.present, self.affine):
-            raise RunBroken(NOT_FINITE)
-
-    def under(self, force: np.ndarray, slack: np.ndarray) -> native.Depths:
-        """Depths [m] and rates [m/s] under contact forces ``force`` (n,) [N] and compensations
-        ``slack`` (m,) [N]; overwritten by the next call.
-
-        Raises
-        ------
-        RunBroken
-            If one of them is not finite: the problem that gave the forces has no solution.
-        """
-        if not native.under(self.affine, self.line.rows, force, slack, self.found):
-            raise RunBroken(NOT_FINITE)
-        return self.found
-
-
 class InnerProblem:
     """Solves the inner problem through both compliances: the linearly implicit coupling.
 
@@ -141,13 +77,16 @@ class InnerProblem:
 
     Attributes
     ----------
+    gap : Affine of depths [m], their rates [m/s] without forces, and what forces take off them
+    found : Depths under the forces looked at last
     pivoted : whether an active set has cycled since this was last set to False
     unknowns : room for the problem, another one when more links need some
     """
 
     def __init__(self, law: LawInSteps, coupled: native.Coupled) -> None:
         self.law = law
-        self.gap = Gap(law.n)
+        self.gap = affine(np.zeros(2 * law.n * (1 + law.n)), law.n)
+        self.found = native.Depths(*np.zeros((2, law.n)))
         self.coupled = coupled
         self.pivoted = False
         self._room = -1
@@ -162,10 +101,9 @@ class InnerProblem:
         RunBroken
             If the active set does not settle, or a law that is not linear finds no force.
         """
-        gap, n, m = self.gap, self.law.n, line.count
+        n, m = self.law.n, line.count
         if m > self._room:
             self.make_room(m)
-        gap.line = line
         if self._bound_to[0] is not heads.affine or self._bound_to[1] is not line:
             # Mostly they are those of the step before.
             self._bound_to = heads.affine, line
@@ -181,7 +119,7 @@ class InnerProblem:
                 f"the contact law finds no force within {native.MOST_TANGENTS} tangents; take a "
                 "smaller numerics.dt_s"
             )
-        depth, rate = gap.found
+        depth, rate = self.found
         solution = self.unknowns.solution
         forces = solution[:n], solution[n:size]
         return InnerSolution(*forces, depth, rate, rounds, self.pivoted, complete)
@@ -212,6 +150,30 @@ class InnerProblem:
             raise NotConverged(_NO_SOLUTION)
         return system.solution
 
+    def take(self, line: LineResponse, heads: Heads) -> None:
+        """Take the gap without forces from the answers of both sides for this step.
+
+        Raises
+        ------
+        RunBroken
+            If one of them is no number; it would compare as out of contact and go unnoticed.
+        """
+        if not native.subtract(heads.affine, line.line, line.present, self.gap):
+            raise RunBroken(NOT_FINITE)
+
+    def under(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> native.Depths:
+        """Depths [m] and rates [m/s] under contact forces ``force`` (n,) [N] and compensations
+        ``slack`` (m,) [N] of links in ``line``; overwritten by the next call.
+
+        Raises
+        ------
+        RunBroken
+            If one of them is not finite: the problem that gave the forces has no solution.
+        """
+        if not native.under(self.gap, line.rows, force, slack, self.found):
+            raise RunBroken(NOT_FINITE)
+        return self.found
+
     def covers(self, line: LineResponse, force: np.ndarray, slack: np.ndarray) -> bool:
         """Whether every link that switches under contact forces ``force`` (n,) [N] has a row in
         ``line``; ``slack`` (m,) are the compensations of the links with a row [N]."""
@@ -222,12 +184,12 @@ class InnerProblem:
         return native.SmallProblem(
             heads=heads,
             share=line.share,
-            gap=self.gap.affine,
+            gap=self.gap,
             pulls=self.law.pulls,
             tangents=self.law.tangents,
             coupled=self.coupled,
             unknowns=self.unknowns,
-            found=self.gap.found,
+            found=self.found,
             max_rounds=_MAX_ROUNDS,
         )
 
@@ -240,6 +202,6 @@ class InnerProblem:
         always[:n] = self.law.pulls
         behind = np.zeros(size, dtype=np.int64)
         right, solution = np.zeros((2, size))
-        matrix, room = np.zeros((size, size)), room_for(size)
+        matrix, room = np.zeros((size, size)), native.Room(size)
         self.unknowns = native.Unknowns(always, behind, matrix, right, solution, room)
         self._bound_to = None, None

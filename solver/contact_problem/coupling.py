@@ -76,7 +76,7 @@ class Coupling(ABC):
     ) -> InnerSolution:
         """The solution with forces and compensations, from both sides' answers in the gap."""
         inner = self.inner
-        depth, rate = inner.gap.under(force, slack)
+        depth, rate = inner.under(line, force, slack)
         complete = inner.covers(line, force, slack)
         return InnerSolution(force, slack, depth, rate, rounds, inner.pivoted, complete)
 
@@ -105,7 +105,7 @@ class Explicit(Coupling):
         force = self._applied(self.law.force(depth, heads.early_velocity - line.early_rate), line)
         self.inner.pivoted = False
         slack = self.inner.slack_under(line, force)
-        self.inner.gap.put(line, heads)
+        self.inner.take(line, heads)
         return self._answered(line, force, slack, 1)
 
 
@@ -137,11 +137,11 @@ class Iterated(Coupling):
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
         """Forces after as many exchanges as they need."""
         inner, force = self.inner, self._latest
-        inner.gap.put(line, heads)
+        inner.take(line, heads)
         inner.pivoted = False
         slack = inner.slack_under(line, force)
         for number in range(1, self._max_iterations + 1):
-            new = self._applied(self.law.force(*inner.gap.under(force, slack)), line)
+            new = self._applied(self.law.force(*inner.under(line, force, slack)), line)
             change = float(np.abs(new - force).max(initial=0.0))
             force, slack = new, inner.slack_under(line, new)
             if change <= self._tolerance:

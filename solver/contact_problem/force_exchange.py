@@ -96,7 +96,7 @@ class Exchange:
         self._count(share.summed.nbytes)
         if not is_root:
             if share.count:
-                rows = share.sent_rows[: share.count]
+                rows = share.rows.numbers[: share.count]
                 comm.Send(rows, dest=0, tag=_ROWS)
                 self._count(rows.nbytes)
         else:
@@ -160,20 +160,20 @@ class Exchange:
             self._merged = merged = larger
             self._sums = self._sums[0], _message(larger.summed)
         end = share.count
-        merged.sent_rows[:end] = share.sent_rows[:end]
+        merged.rows.numbers[:end] = share.rows.numbers[:end]
         missing = total - end
         if not missing:
             return
         parts, status = {}, MPI.Status()
         while missing > 0:
             comm.Probe(source=MPI.ANY_SOURCE, tag=_ROWS, status=status)
-            width = share.sent_rows.shape[1]
+            width = share.rows.numbers.shape[1]
             rows = np.empty((status.Get_count(MPI.DOUBLE) // width, width))
             comm.Recv(rows, source=status.Get_source(), tag=_ROWS)
             parts[status.Get_source()] = rows
             missing -= len(rows)
         for source in sorted(parts):
-            merged.sent_rows[end : end + len(parts[source])] = parts[source]
+            merged.rows.numbers[end : end + len(parts[source])] = parts[source]
             end += len(parts[source])
 
 

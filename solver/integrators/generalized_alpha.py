@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.line_state import AlphaAhead, AlphaSteps
+from catenary.solver.integrators.line_state import AlphaAhead
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.pieces.operator_pieces import WantedPieces
 from catenary.solver.model.model import Model
@@ -66,33 +66,15 @@ class GeneralizedAlphaLine(LineIntegrator):
             damping_on_stiffness=self._alpha_share,
         )
 
-    def _ahead(self) -> tuple[AlphaAhead, AlphaSteps] | None:
-        by = self._by
-        known = by.known_of_balanced + by.known_of_own * by.ratio, by.known_of_own
-        # Effect of b and p before a step on displacement and velocity at its end.
-        shares = tuple(zip((by.ratio, 1.0), known, strict=True))
-        position = [by.position_of_own * a + by.position_of_known * p for a, p in shares]
-        velocity = [by.velocity_of_own * a + by.velocity_of_known * p for a, p in shares]
-        work = by.damping_on_stiffness
-        balance = position[0] + work * velocity[0], position[1] + work * velocity[1]
-        if abs(balance[0]) < _LEAST_SHARE * by.dt**2:
-            return None
-        steps = AlphaSteps(
-            known,
-            (velocity[0], velocity[1]),
-            balance,
-            self.position_factor,
-            self.velocity_factor,
-            by.dt,
-            work,
-            self._beta_share,
-        )
+    def _ahead(self) -> AlphaAhead | None:
         operators, (shown, rate, _) = self.operators, self.motion.read[:3]
         total = aligned_arrays.zeros(shown.size, 5)
         # Input of products with C, if there are any.
         predicted = rate[:0] if self._proportional else operators.rate
-        motion = AlphaAhead(operators.factor, rate, total, self._known, shown, steps, predicted)
-        return motion, steps
+        arrays = operators.factor, rate, total, self._known, shown, predicted
+        factors = self.position_factor, self.velocity_factor
+        motion = AlphaAhead(*arrays, self._by, factors, self._beta_share)
+        return None if abs(motion.balance[0]) < _LEAST_SHARE * self._by.dt**2 else motion
 
     def predict(self) -> None:
         """Turn displacement and velocity into what they are at the end of the step if b is zero."""

@@ -18,12 +18,7 @@ from catenary.base.mpi import MPI
 from catenary.base.parallel import total
 from catenary.base.petsc import PETSc
 from catenary.solver.integrators.line_loads import LineLoads
-from catenary.solver.integrators.line_state import (
-    AlphaSteps,
-    LineState,
-    Newmark,
-    PredictedLineState,
-)
+from catenary.solver.integrators.line_state import LineState, PredictedLineState
 from catenary.solver.integrators.slow_path import GENERAL, LIBRARY, PARTS, SlowPath
 from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays, native
@@ -129,17 +124,16 @@ class LineIntegrator(ABC):
 
         Of steps there are then only free ones, in two passes over the state. Collective.
         """
-        ahead = self._ahead()
-        if ahead is None:
+        motion = self._ahead()
+        if motion is None:
             self.slow_path = SlowPath(
                 "the method does not keep its state one prediction ahead", PARTS
             )
             return
-        motion, steps = ahead
         loads = np.zeros(0) if self.loads is None else self.loads.values
         parts, passes = self.operators.by_stations(not self._proportional, self._shares), None
         if parts is not None:
-            passes = StationPasses(parts, loads, motion, steps)
+            passes = StationPasses(parts, loads, motion)
         # A rank without stations has no passes; it keeps its state like the others.
         can = passes is not None or self.ownership.n_local == 0
         if not self._comm.allreduce(int(can), op=MPI.MIN):
@@ -159,11 +153,8 @@ class LineIntegrator(ABC):
         if self.loads is not None:
             self.loads.read(motion)
 
-    def _ahead(self) -> tuple[PredictedLineState, Newmark | AlphaSteps] | None:
-        """A motion to keep ahead, in the arrays of this one, and the steps it is kept for.
-
-        None if the method cannot.
-        """
+    def _ahead(self) -> PredictedLineState | None:
+        """A motion to keep ahead, in the arrays of this one; None if the method cannot."""
         return None
 
     @property

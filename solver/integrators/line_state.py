@@ -10,12 +10,11 @@ with arrays x, y and z that a step carries on, and five shares.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
 from catenary.solver.kernels import native
-from catenary.solver.kernels.native import Motion, Newmark
+from catenary.solver.kernels.native import Alpha, Motion, Newmark
 
 
 class LineState:
@@ -86,12 +85,18 @@ class PredictedLineState(LineState):
     and v* of eq. (2.5), then y = v*, and the acceleration z. A step that starts from d and v reads
     all three to predict and writes two of them; from here it starts by reading one.
 
+    Attributes
+    ----------
+    known, predicted : further arrays that a step reads and writes, see `AlphaAhead`
+
     Parameters
     ----------
     ahead, velocity, acceleration : arrays (n_local,) for x, y and z
     shown : array (n_local,) that reading ``displacement`` fills
     steps : factors of the coming steps, all alike
     """
+
+    known = predicted = np.zeros(0)
 
     def __init__(
         self,
@@ -108,6 +113,13 @@ class PredictedLineState(LineState):
         shares = [-1.0, -(c_work + dt), dt * c_velocity - c_position, 1.0, -c_velocity]
         self.read[3][:] = shares
         self._steps, self._shown = steps, shown
+
+    def changes(self, by_mass: float) -> native.Changes:
+        """Coefficients from one prediction to the next; ``by_mass`` as there."""
+        by_position, by_velocity, _ = map(float, self.gains)
+        nothing = 0.0, 0.0
+        newmark = self._steps.dt, by_position, by_velocity, self._steps.damping_share
+        return native.Changes(*newmark, nothing, nothing, nothing, by_mass)
 
     @property
     def displacement(self) -> np.ndarray:
@@ -148,33 +160,6 @@ class PredictedLineState(LineState):
             array[:] = state.get(name, array)
 
 
-class AlphaSteps(NamedTuple):
-    """Factors of a step of the generalized-alpha method, from one state ahead to the next.
-
-    The acceleration b balances the forces; the algorithm's own is a = p + r b, with p known when a
-    step begins.
-
-    Attributes
-    ----------
-    known : factors of b and p before a step in p of the step [-]
-    velocity : factors of b and p in the predicted velocity [s]
-    balance : factors k of b and l of p in z = k b + l p [s2]
-    position_factor, velocity_factor : factors of b in displacement [s2] and velocity [s]
-    dt : time step [s]
-    work_velocity : c, so that K (d + c v) gives elastic forces and those of damping on K [s]
-    damping_share : part of damping on mass that the acceleration lacks [1/s]
-    """
-
-    known: tuple[float, float]
-    velocity: tuple[float, float]
-    balance: tuple[float, float]
-    position_factor: float
-    velocity_factor: float
-    dt: float
-    work_velocity: float
-    damping_share: float
-
-
 class AlphaAhead(PredictedLineState):
     """State for the generalized-alpha method, whose steps need an acceleration p known before.
 
@@ -186,9 +171,15 @@ class AlphaAhead(PredictedLineState):
     ahead, velocity, balance : arrays (n_local,) for x, y and z
     known : array (n_local,) of p in the latest step
     shown : array (n_local,) that reading ``displacement`` fills
-    steps : factors of the coming steps, all alike; ``balance[0]`` is not zero
     predicted : array (n_local,) for v* of the coming step, which a product with C reads; empty
         without such a product. The step fills it at its beginning, from y, z and p
+    by : factors of the coming steps, all alike
+    factors : of the step's b in displacement [s2] and velocity [s]
+    damping_share : part of damping on mass that b lacks [1/s]
+
+    Attributes
+    ----------
+    balance : factors k and l [s2]; k must not be zero
     """
 
     def __init__(
@@ -198,17 +189,46 @@ class AlphaAhead(PredictedLineState):
         balance: np.ndarray,
         known: np.ndarray,
         shown: np.ndarray,
-        steps: AlphaSteps,
         predicted: np.ndarray,
+        by: Alpha,
+        factors: tuple[float, float],
+        damping_share: float,
     ) -> None:
-        way = steps.dt + steps.work_velocity
-        by_position = steps.position_factor + way * steps.velocity_factor + steps.balance[0]
-        gains = -by_position, steps.velocity_factor
-        LineState.__init__(self, ahead, velocity, balance, gains)
-        self.gains[2] = steps.balance[0]
-        self.read[3][:] = [-1.0, -way, -1.0, 1.0, 0.0]
-        self._way, self.balance, self._shown, self.known = way, steps.balance, shown, known
-        self.predicted = predicted
+        # Effect of b and p before a step on p in it, and on displacement and velocity at its end.
+        self._by_known = by.known_of_balanced + by.known_of_own * by.ratio, by.known_of_own
+        shares = tuple(zip((by.ratio, 1.0), self._by_known, strict=True))
+        position = [by.position_of_own * a + by.position_of_known * p for a, p in shares]
+        speed = [by.velocity_of_own * a + by.velocity_of_known * p for a, p in shares]
+        work = by.damping_on_stiffness
+        self.balance = position[0] + work * speed[0], position[1] + work * speed[1]
+        self._by_velocity, self._dt, self._damping_share = speed, by.dt, damping_share
+        self._way = by.dt + work
+        by_position = factors[0] + self._way * factors[1] + self.balance[0]
+        LineState.__init__(self, ahead, velocity, balance, (-by_position, factors[1]))
+        self.gains[2] = self.balance[0]
+        self.read[3][:] = [-1.0, -self._way, -1.0, 1.0, 0.0]
+        self._shown, self.known, self.predicted = shown, known, predicted
+
+    def changes(self, by_mass: float) -> native.Changes:
+        """Coefficients from one prediction to the next; ``by_mass`` as there."""
+        of_balanced, of_known = self.balance
+        by_position, by_velocity, _ = map(float, self.gains)
+
+        def from_kept(of_b: float, of_p: float) -> tuple[float, float]:
+            """Shares of b and p as those of z and p."""
+            return of_b / of_balanced, of_p - of_b * of_known / of_balanced
+
+        return native.Changes(
+            self._dt,
+            # z of the end of the step stands for its part of the coming prediction.
+            by_position + of_balanced,
+            by_velocity,
+            self._damping_share,
+            known=from_kept(*self._by_known),
+            velocity=from_kept(*self._by_velocity),
+            balance=self.balance,
+            by_mass=by_mass,
+        )
 
     @property
     def acceleration(self) -> np.ndarray:

@@ -45,12 +45,12 @@ class NewmarkLine(LineIntegrator):
             self._beta_share,
         )
 
-    def _ahead(self) -> tuple[PredictedLineState, Newmark]:
+    def _ahead(self) -> PredictedLineState:
         operators, (shown, velocity, acceleration) = self.operators, self.motion.read[:3]
         if not self._proportional:
             velocity = operators.rate  # which products with C read
         ahead = operators.factor, velocity, acceleration, shown
-        return PredictedLineState(*ahead, self._steps), self._steps
+        return PredictedLineState(*ahead, self._steps)
 
     def predict(self) -> None:
         """Turn displacement and velocity into their predictions of eq. (2.5)."""

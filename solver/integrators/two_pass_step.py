@@ -12,12 +12,7 @@ from itertools import starmap
 
 import numpy as np
 
-from catenary.solver.integrators.line_state import (
-    AlphaAhead,
-    AlphaSteps,
-    Newmark,
-    PredictedLineState,
-)
+from catenary.solver.integrators.line_state import PredictedLineState
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import NO_LINKS
@@ -47,7 +42,6 @@ class StationPasses:
     loads : forces on all unknowns that are solved for [N], or none, added in the pass forth; kept
         by reference
     motion : motion of the rank's own stations
-    steps : factors of the steps that the motion is kept for
     """
 
     def __init__(
@@ -55,25 +49,22 @@ class StationPasses:
         parts: ByStations,
         loads: np.ndarray,
         motion: PredictedLineState,
-        steps: Newmark | AlphaSteps,
     ) -> None:
         product, factors, read, velocity, answer, by_mass = parts
         _, _, low, high, _ = factors.ends.tolist()
         self.factors = factors
-        changes = changes_of(motion, steps, by_mass)
-        known = predicted = np.zeros(0)
-        if isinstance(motion, AlphaAhead):
-            known, predicted = motion.known, motion.predicted
+        self.known = motion.known
         self._starts = factors.starts[low : high + 1] - factors.starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
         pairs = zip(product.layout.parts, factors.layout.parts, strict=True)
         layouts = [(rows.native, columns.native) for rows, columns in pairs]
         self.are_compiled = all(starmap(native.are_compiled, layouts))
-        arrays = native.PassArrays(read, velocity, loads, answer, motion.read, known, predicted)
+        arrays = native.PassArrays(
+            read, velocity, loads, answer, motion.read, self.known, motion.predicted
+        )
         stations = product.stations.station_types, product.arrays, factors.arrays
-        self.parts = native.PassParts(layouts, *stations, arrays, changes)
+        self.parts = native.PassParts(layouts, *stations, arrays, motion.changes(by_mass))
         self.native = native.TwoPasses(self.parts)
-        self.known = known
         self.track_links(NO_LINKS, np.zeros(0))
 
     def track_links(self, links: native.Links, reserve: np.ndarray) -> None:
@@ -128,34 +119,3 @@ class StationPasses:
         ``track_links``."""
         self.native.open(window)
         self.native.track(native.TrackedLinks(links, reserve, window.ranges, window.low.size))
-
-
-def changes_of(
-    motion: PredictedLineState, steps: Newmark | AlphaSteps, by_mass: float
-) -> native.Changes:
-    """Coefficients that take ``motion`` from one prediction to the next.
-
-    ``steps`` are the factors of its method, ``by_mass`` as in ``native.Changes``.
-    """
-    by_position, by_velocity, _ = map(float, motion.gains)
-    nothing = 0.0, 0.0
-    if isinstance(steps, Newmark):
-        newmark = steps.dt, by_position, by_velocity, steps.damping_share
-        return native.Changes(*newmark, nothing, nothing, nothing, by_mass)
-    of_balanced, of_known = steps.balance
-
-    def from_kept(shares: tuple[float, float]) -> tuple[float, float]:
-        """Shares of b and p as those of z and p."""
-        return shares[0] / of_balanced, shares[1] - shares[0] * of_known / of_balanced
-
-    return native.Changes(
-        dt=steps.dt,
-        # z of the end of the step stands for its part of the coming prediction.
-        by_position=by_position + of_balanced,
-        by_velocity=by_velocity,
-        damping_share=steps.damping_share,
-        known=from_kept(steps.known),
-        velocity=from_kept(steps.velocity),
-        balance=steps.balance,
-        by_mass=by_mass,
-    )

@@ -115,12 +115,7 @@ def _tangent(change: Change, n: int, results: np.ndarray) -> native.Tangent:
     return native.Tangent(
         change.rest,
         native.LinkChange(change.links, change.weights),
-        [
-            native.HeadChange(
-                *head.arrays, state.copy(), [model.stepped for model in head.beside], head.step
-            )
-            for head, state in zip(change.heads, change.states, strict=True)
-        ],
+        [head._replace(state=head.state.copy()) for head in change.heads],
         change.drives,
         native.LawChange(change.law, change.hertz, least_speeds, np.zeros(n)),
         change.start,

@@ -77,15 +77,6 @@ class SetUp:
     fixed: dict[str, np.ndarray]
 
 
-class StepChange(NamedTuple):
-    """The derivative of a pantograph's step: of a linear chain ``arrays``, empty if it does not
-    change; of others models ``beside`` it, with the parameter a ``step`` lower and higher."""
-
-    arrays: native.LinearStep
-    beside: Sequence[SteppedHead]
-    step: float
-
-
 class MatrixTerm(NamedTuple):
     """A derivative of matrices, which is multiplied with a sum of the line's motion.
 
@@ -106,15 +97,14 @@ class MatrixTerm(NamedTuple):
 
 @dataclass(frozen=True)
 class Change:
-    """Derivatives of a set-up by one parameter, per unit of it: as ``SetUp``; parts that do not
-    change are empty."""
+    """Derivatives of a set-up by one parameter, per unit of it: as ``SetUp``, of each head with its
+    state; parts that do not change are empty."""
 
     matrices: Sequence[MatrixTerm]
     rest: np.ndarray
     links: np.ndarray
     weights: np.ndarray
-    heads: Sequence[StepChange]
-    states: Sequence[np.ndarray]
+    heads: Sequence[native.HeadChange]
     drives: np.ndarray
     law: np.ndarray
     hertz: np.ndarray
@@ -262,24 +252,20 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
         """Without rows where nothing changes."""
         return np.ascontiguousarray(values if values.any() else values[:0])
 
-    def of_head(number: int) -> StepChange:
-        linear = now.heads[number]
+    def of_head(number: int) -> native.HeadChange:
+        state, linear = of(lambda one: one.states[number]), now.heads[number]
         if not isinstance(linear, native.LinearStep):
             models = [side.heads[number] for side in sides]
-            beside = [model for model in models if isinstance(model, SteppedHead)]
-            return StepChange(_NO_STEP, beside, step)
+            beside = [model.stepped for model in models if isinstance(model, SteppedHead)]
+            return native.HeadChange(*_NO_STEP, state, beside, step)
         parts = [
             of(lambda one, name=name: getattr(one.heads[number], name))  # type: ignore[misc]
             for name in linear._fields
         ]
-        if not any(part.any() for part in parts):
-            return StepChange(_NO_STEP, (), step)
-        return StepChange(native.LinearStep(*map(np.ascontiguousarray, parts)), (), step)
+        own = native.LinearStep(*map(np.ascontiguousarray, parts))
+        own = own if any(part.any() for part in parts) else _NO_STEP
+        return native.HeadChange(*own, state, [], step)
 
-    def of_state(number: int) -> np.ndarray:
-        return of(lambda one: one.states[number])
-
-    pantographs = range(len(now.heads))
     start, speed = or_none(of(lambda one: one.start)), float(of(lambda one: one.speed))
     if (start.size or speed) and now.follows_surface:
         raise InputError(
@@ -294,8 +280,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
         rest=or_none(of(lambda one: one.rest)),
         links=or_none(of(lambda one: one.links)),
         weights=or_none(of(lambda one: one.weights)),
-        heads=[of_head(number) for number in pantographs],
-        states=[of_state(number) for number in pantographs],
+        heads=[of_head(number) for number in range(len(now.heads))],
         drives=or_none(of(lambda one: one.drives)),
         law=or_none(of(lambda one: one.law)),
         hertz=or_none(of(lambda one: one.hertz)),

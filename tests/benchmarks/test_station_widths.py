@@ -63,7 +63,7 @@ def passes(widths: tuple[int, ...], full: bool = True, more: bool = False) -> Ca
     motion = PredictedLineState(read[b:-b], velocity, answer, np.zeros(n), STEPS)
     motion.put(*np.full((3, n), 1e-3))
     return StationPasses(
-        ByStations(product, factors, read, read, answer, 0.0), np.zeros(0), motion, STEPS
+        ByStations(product, factors, read, read, answer, 0.0), np.zeros(0), motion
     ).native.step
 
 

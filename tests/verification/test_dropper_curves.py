@@ -24,7 +24,6 @@ from catenary.meshgen.hardware import DropperKind
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.solver.contact_problem.complementarity import room_for
 from catenary.solver.kernels import native
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
@@ -421,7 +420,7 @@ def test_links_with_any_rising_tables_of_slopes_find_their_pieces() -> None:
         matrix, found = np.eye(place.size) - coupling, np.zeros(place.size)
         signs = native.Signs(np.zeros(place.size, dtype=bool), np.zeros(place.size, dtype=np.int64))
         system = native.System(-reserve, found, matrix)
-        rounds, pivoted = native.find_solution(system, signs, 30, room_for(place.size))
+        rounds, pivoted = native.find_solution(system, signs, 30, native.Room(place.size))
         assert rounds > 0
         cycled += pivoted
         moved = np.linalg.solve(whole, load - own.T @ found)

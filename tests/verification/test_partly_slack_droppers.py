@@ -65,7 +65,7 @@ class Step:
         # A contact whose wire is not on its strip: loops are those that runs have compiled.
         line = LineResponse(1, size)
         line.count, line.present[:] = size, 0.0
-        line.rows.number[:], line.rows.reserve[:] = np.arange(size), self.reserve
+        line.rows.numbers[:, 0], line.rows.numbers[:, 1] = np.arange(size), self.reserve
         law = LinearInSteps(LinearLaw(1.0, 0.0), 1, pulls=False)
         return InnerProblem(law, links).solve(line, Heads(1))
 

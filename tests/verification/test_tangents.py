@@ -191,7 +191,7 @@ def test_tangents_are_those_of_dense_matrices() -> None:
         )
         # Heads start with the accelerations of their forces, which are other ones at both sides.
         start = np.zeros((3, line.size))
-        start[:, -2:] = change.states[0].reshape(3, 2)
+        start[:, -2:] = change.heads[0].state.reshape(3, 2)
         tangents.append(DenseTangent(sides, step, start))
     forces, sets = np.zeros((len(marched.force), len(CHANGES))), set()
     heights = np.zeros_like(forces)

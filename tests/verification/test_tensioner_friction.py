@@ -8,7 +8,6 @@ from measuring import check, march, registered
 from small_lines import BARE, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.solver.contact_problem.complementarity import room_for
 from catenary.solver.effects.effect import Effect
 from catenary.solver.effects.shipped.axial_effects import CREEP
 from catenary.solver.kernels import native
@@ -105,7 +104,7 @@ def test_wheels_that_slip_either_way_are_found_by_pivoting() -> None:
         matrix, right = random_wheels(seed, wheels, links)
         none, found = np.zeros(right.size, dtype=bool), np.zeros(right.size)
         signs = native.Signs(none, none.astype(np.int64))
-        assert native.pivot(native.System(right, found, matrix), signs, room_for(right.size)) > 0
+        assert native.pivot(native.System(right, found, matrix), signs, native.Room(right.size)) > 0
         left = matrix @ found - right
         rounding = 1e-9 * (1.0 + np.abs(right).max())
         assert min(found.min(), left.min()) > -rounding

@@ -1,6 +1,9 @@
 #pragma once
 // Small dense systems with an active set of rows and columns, and room to work in for the small
-// problem of a step, which allocates nothing.
+// problem of a step, which allocates nothing in it.
+#include <memory>
+#include <vector>
+
 #include "base/arrays.hpp"
 
 namespace catenary {
@@ -11,32 +14,41 @@ struct PathRoom {
     Array2<double> numbers;  ///< (7, n + 1)
     Array2<int64_t> counts;  ///< (4, n + 1)
     std::span<bool> all;     ///< (n + 1,)
-    CATENARY_RECORD(columns, numbers, counts, all)
-    CATENARY_SHAPES("n n, 7 n, 4 n, n")
 };
 
-/// Room to pivot with up to k unknowns.
-struct PivotRoom {
-    Array2<bool> needs, excludes;  ///< (k, k)
-    std::span<int64_t> turned;     ///< (20 k + 100,)
-    Array2<double> partly;         ///< (k, k)
-    Array2<double> numbers;        ///< (4, k)
-    Array2<int64_t> counts;        ///< (2, k)
-    Array2<bool> marks;            ///< (3, k)
-    PathRoom path;                 ///< of k / 2 dimensions
-    CATENARY_RECORD(needs, excludes, turned, partly, numbers, counts, marks, path)
-    CATENARY_SHAPES("k k, k k, 20k+100, k k, 4 k, 2 k, 3 k")
-};
+/// Room to solve for up to k unknowns.
+class Room {
+    std::vector<std::shared_ptr<void>> memory_;
+    template <class T>
+    std::span<T> numbers(int64_t n) {
+        const std::shared_ptr<T[]> own(new T[n]());
+        memory_.push_back(own);
+        return {own.get(), static_cast<size_t>(n)};
+    }
+    template <class T>
+    Array2<T> table(int64_t rows, int64_t columns) {
+        return {numbers<T>(rows * columns).data(), rows, columns};
+    }
 
-/// Room to solve for up to k unknowns: `factors` (k, k), the others (k,).
-struct Room {
-    Array2<double> factors;
-    std::span<int64_t> acting, order;
-    std::span<double> left, change;
-    std::span<bool> acts, before;
-    PivotRoom pivoting;
-    CATENARY_RECORD(factors, acting, order, left, change, acts, before, pivoting)
-    CATENARY_SHAPES("k k, k, k, k, k, k, k, k=k")
+  public:
+    explicit Room(int64_t most) : k(most) {}
+
+    int64_t k;
+    /// For elimination, and sets of rows that act.
+    Array2<double> factors = table<double>(k, k);
+    std::span<int64_t> acting = numbers<int64_t>(k), order = numbers<int64_t>(k);
+    std::span<double> left = numbers<double>(k), change = numbers<double>(k);
+    std::span<bool> acts = numbers<bool>(k), before = numbers<bool>(k);
+    /// For pivoting.
+    Array2<bool> needs = table<bool>(k, k), excludes = table<bool>(k, k);
+    std::span<int64_t> turned = numbers<int64_t>(20 * k + 100);
+    std::span<bool> odd = numbers<bool>(k);
+    /// For shares of dependents, of which there are no more than leaders.
+    Array2<double> partly = table<double>(k, k), of_shares = table<double>(4, k);
+    Array2<int64_t> numbers_of_leaders = table<int64_t>(2, k);
+    Array2<bool> marks = table<bool>(2, k);
+    PathRoom path{table<double>(k / 2 + 1, k / 2 + 1), table<double>(7, k / 2 + 1),
+                  table<int64_t>(4, k / 2 + 1), numbers<bool>(k / 2 + 1)};
 };
 
 /// matrix x = right of m unknowns, the length of `right`; the matrix may have more of both.

@@ -44,8 +44,8 @@ struct Beside {
 void find_bends(const System& system, const Room& room) {
     const auto& [matrix, right, solution] = system;
     const int64_t n = size(right);
-    const auto& needs = room.pivoting.needs;
-    const auto& excludes = room.pivoting.excludes;
+    const auto& needs = room.needs;
+    const auto& excludes = room.excludes;
     const auto scale = room.left.first(n);
     const auto peak = room.acting.first(n);
     for (int64_t i = 0; i < n; ++i) {
@@ -105,9 +105,9 @@ int64_t circle_since(std::span<const int64_t> turned, std::span<bool> odd) {
 Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     const auto& [matrix, right, solution] = system;
     const auto& [always, behind] = signs;
-    const auto& needs = room.pivoting.needs;
-    const auto& excludes = room.pivoting.excludes;
-    const auto& turned = room.pivoting.turned;
+    const auto& needs = room.needs;
+    const auto& excludes = room.excludes;
+    const auto& turned = room.turned;
     const int64_t n = size(right), most = 20 * n + 100;
     const auto acts = room.acts.first(n);
     const double little = kRounding * (1.0 + largest(right));
@@ -132,7 +132,7 @@ Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
     int64_t n_turned = 0;
     for (int64_t rounds = 1; rounds < most; ++rounds) {
         // Each set determines the next one, so a set that comes again is in a cycle.
-        const int64_t since = circle_since(turned.first(n_turned), room.pivoting.marks[0].first(n));
+        const int64_t since = circle_since(turned.first(n_turned), room.odd.first(n));
         if (since < n_turned) return {false, rounds, n_turned, since};
         solve_on(system, acts, room);
         int64_t first = 0;
@@ -161,8 +161,7 @@ class Shares : public Map {
           n_(size(system.right)),
           scale_(1.0 + largest(system.right)) {
         std::ranges::fill(is_sought_, false);
-        for (int64_t t = circle.since; t < circle.n_turned; ++t)
-            is_sought_[room_.pivoting.turned[t]] = true;
+        for (int64_t t = circle.since; t < circle.n_turned; ++t) is_sought_[room_.turned[t]] = true;
         int64_t n_sought = 0;
         for (int64_t i = 0; i < n_; ++i) {
             if (signs_.behind[i] == 1) leaders_[n_leaders_++] = i - 1;
@@ -187,8 +186,7 @@ class Shares : public Map {
             n = 0;
             for (int64_t leader : leaders())
                 if (is_sought_[leader]) place_[n++] -= excess_[leader];
-            const bool found =
-                find_zero(*this, place, kFirstGrid, kAgreement, room_.pivoting.path, room_);
+            const bool found = find_zero(*this, place, kFirstGrid, kAgreement, room_);
             take(place);
             put_excess();
             bool more = false;
@@ -228,7 +226,7 @@ class Shares : public Map {
     /// not; no number where there is none.
     void put_excess() {
         const auto& [matrix, right, solution] = system_;
-        const Array2<double>& partly = room_.pivoting.partly;
+        const Array2<double>& partly = room_.partly;
         for (int64_t i = 0; i < n_; ++i) {
             const int64_t behind = signs_.behind[i];
             const double part = behind > 0 ? shares_[i - behind] : 1.0;
@@ -253,14 +251,11 @@ class Shares : public Map {
     const Room& room_;
     int64_t n_, n_leaders_ = 0, rounds_ = 0, n_evaluations_ = 0;
     double scale_;  ///< of right-hand sides
-    std::span<double> shares_ = room_.pivoting.numbers[0].first(n_),
-                      right_ = room_.pivoting.numbers[1].first(n_),
-                      excess_ = room_.pivoting.numbers[2].first(n_),
-                      place_ = room_.pivoting.numbers[3].first(n_);
-    std::span<int64_t> leaders_ = room_.pivoting.counts[0].first(n_),
-                       none_ = room_.pivoting.counts[1].first(n_);
-    std::span<bool> is_sought_ = room_.pivoting.marks[1].first(n_),
-                    free_ = room_.pivoting.marks[2].first(n_);
+    std::span<double> shares_ = room_.of_shares[0].first(n_), right_ = room_.of_shares[1].first(n_),
+                      excess_ = room_.of_shares[2].first(n_), place_ = room_.of_shares[3].first(n_);
+    std::span<int64_t> leaders_ = room_.numbers_of_leaders[0].first(n_),
+                       none_ = room_.numbers_of_leaders[1].first(n_);
+    std::span<bool> is_sought_ = room_.marks[0].first(n_), free_ = room_.marks[1].first(n_);
 };
 
 }  // namespace
@@ -280,6 +275,7 @@ int64_t pivot(const System& system, const Signs& signs, const Room& room) {
 
 Found find_solution(const System& system, const Signs& signs, int64_t max_rounds,
                     const Room& room) {
+    if (size(system.right) > room.k) throw std::out_of_range("a system has no room");
     const int64_t rounds = settle(system, signs, max_rounds, room);
     if (rounds > 0) return {rounds, false};
     const int64_t more = pivot(system, signs, room);

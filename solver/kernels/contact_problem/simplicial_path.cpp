@@ -31,25 +31,24 @@ bool all_finite(std::span<const double> numbers) {
 /// The path on one grid.
 class Path {
   public:
-    Path(Map& of, std::span<const double> start, double width, const PathRoom& path,
-         const Room& room)
+    Path(Map& of, std::span<const double> start, double width, const Room& room)
         : of_(of),
           start_(start),
           width_(width),
           n_(size(start)),
-          columns_(path.columns),
+          columns_(room.path.columns),
           room_(room),
-          origin_(path.numbers[0].first(n_)),
-          zero_(path.numbers[1].first(n_ + 1)),
-          entering_(path.numbers[2].first(n_ + 1)),
-          weights_(path.numbers[3].first(n_ + 1)),
-          change_(path.numbers[4].first(n_ + 1)),
-          place_(path.numbers[5].first(n_)),
-          order_(path.counts[0].first(n_ + 1)),
-          first_(path.counts[1].first(n_ + 1)),
-          corner_(path.counts[2].first(n_ + 1)),
-          held_(path.counts[3].first(n_ + 1)),
-          all_(part(path.all, 0, n_ + 1)) {
+          origin_(room.path.numbers[0].first(n_)),
+          zero_(room.path.numbers[1].first(n_ + 1)),
+          entering_(room.path.numbers[2].first(n_ + 1)),
+          weights_(room.path.numbers[3].first(n_ + 1)),
+          change_(room.path.numbers[4].first(n_ + 1)),
+          place_(room.path.numbers[5].first(n_)),
+          order_(room.path.counts[0].first(n_ + 1)),
+          first_(room.path.counts[1].first(n_ + 1)),
+          corner_(room.path.counts[2].first(n_ + 1)),
+          held_(room.path.counts[3].first(n_ + 1)),
+          all_(part(room.path.all, 0, n_ + 1)) {
         std::ranges::fill(all_, true);
         std::ranges::fill(zero_, 0.0);
         zero_[n_] = 1.0;
@@ -176,16 +175,15 @@ class Path {
 
 }  // namespace
 
-bool find_zero(Map& of, std::span<double> z, double width, double small, const PathRoom& path,
-               const Room& room) {
-    const auto value = path.numbers[6].first(z.size());
+bool find_zero(Map& of, std::span<double> z, double width, double small, const Room& room) {
+    const auto value = room.path.numbers[6].first(z.size());
     auto is_zero = [&] {
         of.at(z, value);
         return std::ranges::all_of(value, [&](double each) { return std::abs(each) <= small; });
     };
     for (; width > kFinest; width *= kFiner) {
         if (is_zero()) return true;
-        if (!Path(of, z, width, path, room).arrive(value)) return false;
+        if (!Path(of, z, width, room).arrive(value)) return false;
         std::ranges::copy(value, z.begin());
     }
     return is_zero();

@@ -29,8 +29,7 @@ class Map {
 /// `z` holds where to begin, and then the last place evaluated; the better, the shorter the path.
 /// `width` is that of the first grid, in units of z; a largest component of `small` counts as zero.
 /// Returns whether the place is a zero: not if the path is too long, or the map no number on it.
-/// `path` is for n dimensions, `room` for solves of n + 1 unknowns.
-bool find_zero(Map& of, std::span<double> z, double width, double small, const PathRoom& path,
-               const Room& room);
+/// `room` is for 2 n unknowns at least.
+bool find_zero(Map& of, std::span<double> z, double width, double small, const Room& room);
 
 }  // namespace catenary

@@ -9,18 +9,6 @@ namespace catenary {
 
 namespace {
 
-/// Put right-hand side and matrix of the contact forces when no link has switched.
-void press(const Affine& gap, const Tangents& tangents, const Unknowns& unknowns) {
-    const auto& [own, offset, by_depth, by_rate] = tangents;
-    const auto& [depth, rate, by_force, rate_by_force] = gap;
-    for (int64_t i = 0; i < size(depth); ++i) {
-        unknowns.right[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i];
-        for (int64_t j = 0; j < size(depth); ++j)
-            unknowns.matrix(i, j) = by_depth[i] * by_force(i, j) + by_rate[i] * rate_by_force(i, j);
-        unknowns.matrix(i, i) += own[i];
-    }
-}
-
 /// Throws std::out_of_range if the first `count` rows are not all of links.
 void check_numbers(const LinkRows& rows, int64_t count, const Coupled& coupled) {
     if (count > rows.capacity()) throw std::out_of_range("there are fewer rows of links");
@@ -45,6 +33,17 @@ bool subtract(const Affine& heads, const Affine& line, std::span<const double> p
         }
     }
     return std::isfinite(total);
+}
+
+void press(const Affine& gap, const Tangents& tangents, const Unknowns& unknowns) {
+    const auto& [own, offset, by_depth, by_rate] = tangents;
+    const auto& [depth, rate, by_force, rate_by_force] = gap;
+    for (int64_t i = 0; i < size(depth); ++i) {
+        unknowns.right[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i];
+        for (int64_t j = 0; j < size(depth); ++j)
+            unknowns.matrix(i, j) = by_depth[i] * by_force(i, j) + by_rate[i] * rate_by_force(i, j);
+        unknowns.matrix(i, i) += own[i];
+    }
 }
 
 bool any_switched(const LinkRows& rows, int64_t count, const Coupled& coupled,
@@ -137,7 +136,9 @@ Solved solve(const SmallProblem& problem) {
         problem;
     const auto& rows = share.rows;
     const int64_t n = size(gap.place), count = static_cast<int64_t>(share.flags[0].rows);
-    if (n + count > size(unknowns.solution) || count > rows.capacity()) return {};
+    if (!unknowns.room || n + count > std::min(size(unknowns.solution), unknowns.room->k) ||
+        count > rows.capacity())
+        return {};
     bool finite = subtract(heads, share.line, share.present, gap);
     for (int64_t i = 0; i < n; ++i) {
         unknowns.always[i] = pulls && share.present[i] != 0.0;
@@ -146,7 +147,7 @@ Solved solve(const SmallProblem& problem) {
     press(gap, tangents, unknowns);
     const auto force = unknowns.solution.first(n);
     auto find_first = [&](int64_t of) {
-        return find_solution(unknowns.system(of), unknowns.signs(of), max_rounds, unknowns.room);
+        return find_solution(unknowns.system(of), unknowns.signs(of), max_rounds, *unknowns.room);
     };
     Found forces = find_first(n);
     int64_t used = n;

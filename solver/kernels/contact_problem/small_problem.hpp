@@ -30,13 +30,13 @@ struct Unknowns {
     std::span<int64_t> behind;
     Array2<double> matrix;  ///< (k, k)
     std::span<double> right, solution;
-    Room room;
+    Room* room;
 
     /// The system of the first ones, and their signs.
     System system(int64_t n) const { return {matrix, right.first(n), solution.first(n)}; }
     Signs signs(int64_t n) const { return {always.first(n), behind.first(n)}; }
     CATENARY_RECORD(always, behind, matrix, right, solution, room)
-    CATENARY_SHAPES("k, k, k k, k, k, k=k")
+    CATENARY_SHAPES("k, k, k k, k, k")
 };
 
 /// Depths [m] and rates [m/s] of the gap at n contacts under forces.
@@ -75,6 +75,8 @@ Solved solve(const SmallProblem& problem);
 /// Fill in the gap without forces, and its decrease by forces; whether all of it is finite.
 bool subtract(const Affine& heads, const Affine& line, std::span<const double> present,
               const Affine& gap);
+/// Put right-hand side and matrix of the contact forces when no link has switched.
+void press(const Affine& gap, const Tangents& tangents, const Unknowns& unknowns);
 /// Whether contact forces (n,) alone take any of the first `count` links beyond its reserve.
 bool any_switched(const LinkRows& rows, int64_t count, const Coupled& coupled,
                   std::span<const double> force);

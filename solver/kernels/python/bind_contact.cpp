@@ -40,16 +40,18 @@ class CalledMap : public Map {
 bool find_zero_of(const py::function& of, std::span<double> z, double width, double small,
                   const Room& room) {
     CalledMap map(of);
-    return find_zero(map, z, width, small, room.pivoting.path, room);
+    return find_zero(map, z, width, small, room);
 }
 
 }  // namespace
 
 void offer_contact(py::module_& module) {
     offer_records<Wires, Answers, Gains, Followed, ContactWork, Sideways, Across, Contacts, Leads,
-                  TrainPlaces, StripEnds, Affine, Bounds, Share>(module);
-    offer_records<Tangents, ReportedForces, StepLaw, Coupled, System, Signs, PathRoom, PivotRoom,
-                  Room, Unknowns, Depths, SmallProblem>(module);
+                  TrainPlaces, StripEnds, Affine, Bounds, LinkRows, Share>(module);
+    offer_records<Tangents, ReportedForces, StepLaw, Coupled, System, Signs, Unknowns, Depths,
+                  SmallProblem>(module);
+    py::class_<Room>(module, "Room", "Room to solve for so many unknowns.")
+        .def(py::init<int64_t>(), py::arg("most"));
     CATENARY_OFFER_TYPE(module, "NODE", Node, x, y, rest, at, begin, width, local, owned, joined);
     CATENARY_OFFER_TYPE(module, "SAMPLE", Sample, x, height, slope);
     CATENARY_OFFER_TYPE(module, "TOUCH", Touch, first, end, half_length, present, x, element, local,
@@ -76,8 +78,8 @@ void offer_contact(py::module_& module) {
     offer(module, "under", under, "n=n, w=3n+2 m=m.., n, m, n=n");
     offer(module, "leaves_out", leaves_out, "n, m, w=3n+2, n=n, *");
     offer(module, "solve", solve_problem, "n=n, n=n");
-    offer(module, "find_solution", find_signed, "m=m, m=m, *, k=m..");
-    offer(module, "pivot", pivot, "m=m, m=m, k=m..");
+    offer(module, "find_solution", find_signed, "m=m, m=m");
+    offer(module, "pivot", pivot, "m=m, m=m");
     offer(module, "find_zero", find_zero_of, "");
     module.attr("MOST_TANGENTS") = kMostTangents;
     offer(module, "linearise", linearise, "n=n, n, n");

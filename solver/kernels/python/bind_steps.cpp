@@ -40,7 +40,8 @@ class HeldSimulation : public Simulation {
         save(reinterpret_cast<std::byte*>(state.data()));
         return state;
     }
-    void go_back(const std::string& state) {
+    void go_back(const py::bytes& saved) {
+        const std::string state = saved;
         if (state.size() != state_size() ||
             !restore(reinterpret_cast<const std::byte*>(state.data())))
             throw py::value_error("this is no state of this line, or it is damaged");

@@ -123,6 +123,7 @@ class Simulation {
     std::vector<OwnBlock> blocks_;
     PreparedLine line_{};
     std::unique_ptr<TwoPasses> free_;
+    std::unique_ptr<Room> room_;
     std::vector<std::unique_ptr<Head>> heads_;
     std::vector<Input> inputs_;
     // The block of one step.

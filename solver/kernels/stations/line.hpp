@@ -55,7 +55,7 @@ struct Ends {
     int64_t begin, end, low, high, middle;
 };
 
-/// Numbers that take a state from one prediction to the next; see `changes_of`.
+/// Numbers that take a state from one prediction to the next; see `PredictedLineState.changes`.
 struct Changes {
     double dt;                        ///< [s]
     double by_position, by_velocity;  ///< gains of x [s2] and y [s] by the acceleration of the step

@@ -44,14 +44,9 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
                 throw std::invalid_argument("a tangent has other heads than the steps");
     }
     const int64_t n = n_contacts(), most = size(own.problem.unknowns.right);
-    for (auto* numbers : {&place_, &rate_, &forces_}) numbers->resize(n);
-    for (auto* numbers : {&right_, &solution_, &left_, &change_, &compensations_})
-        numbers->resize(most);
-    for (auto* numbers : {&matrix_, &factors_}) numbers->resize(most * most);
+    for (auto* numbers : {&place_, &rate_}) numbers->resize(n);
+    for (auto* numbers : {&right_, &solution_}) numbers->resize(most);
     side_by_side_.resize(most * kMostScenes);
-    for (auto* numbers : {&index_, &order_}) numbers->resize(most);
-    acts_ = std::make_unique<bool[]>(most);
-    std::fill_n(acts_.get(), most, true);
 }
 
 Taken TangentSteps::take(int64_t first, int64_t end) {
@@ -75,11 +70,14 @@ void TangentSteps::find_acting() {
     acting_.contacts.clear();
     acting_.rows.clear();
     acting_.numbers.clear();
-    for (int64_t i = 0; i < n_contacts(); ++i)
-        if (force()[i] != 0.0 || (problem.pulls && problem.share.present[i] != 0.0))
-            acting_.contacts.push_back(i);
+    const auto acts = problem.unknowns.room->acts;
+    for (int64_t i = 0; i < n_contacts(); ++i) {
+        acts[i] = force()[i] != 0.0 || (problem.pulls && problem.share.present[i] != 0.0);
+        if (acts[i]) acting_.contacts.push_back(i);
+    }
     for (int64_t k = 0; k < n_compensations(); ++k) {
-        if (force()[n_contacts() + k] == 0.0) continue;
+        acts[n_contacts() + k] = force()[n_contacts() + k] != 0.0;
+        if (!acts[n_contacts() + k]) continue;
         acting_.rows.push_back(k);
         acting_.numbers.push_back(problem.share.rows.number(k));
     }
@@ -94,45 +92,20 @@ void TangentSteps::count() {
     switches[2] += acting_.numbers != was_.numbers;
 }
 
-/// The matrix of the small problem, as far as it acts; see `couple` and `press`.
-void TangentSteps::fill_matrix() {
+/// Put the matrix of the small problem with the tangents of the law under the forces found.
+void TangentSteps::fill_matrix() const {
     const SmallProblem& problem = parts().problem;
-    const auto& [own, offset, by_depth, by_rate] = problem.tangents;
-    const LinkRows& rows = problem.share.rows;
-    const Coupled& coupled = problem.coupled;
-    const int64_t m = acting_.n(), n = static_cast<int64_t>(acting_.contacts.size());
-    const int64_t half = coupled.band.columns / 2;
-    const Array2<double> matrix{matrix_.data(), m, m};
-    for (int64_t i = 0; i < n; ++i) {
-        const int64_t contact = acting_.contacts[i];
-        for (int64_t j = 0; j < n; ++j)
-            matrix(i, j) =
-                by_depth[contact] * problem.gap.by_force(contact, acting_.contacts[j]) +
-                by_rate[contact] * problem.gap.rate_by_force(contact, acting_.contacts[j]);
-        matrix(i, i) += own[contact];
-        for (int64_t k = 0; n + k < m; ++k)
-            matrix(i, n + k) = -(by_depth[contact] * rows.lift(acting_.rows[k], contact) +
-                                 by_rate[contact] * rows.rise(acting_.rows[k], contact));
-    }
-    for (int64_t k = 0; n + k < m; ++k) {
-        const int64_t number = acting_.numbers[k];
-        const double released = coupled.released[number];
-        for (int64_t j = 0; j < n; ++j)
-            matrix(n + k, j) = released * rows.reaction(acting_.rows[k], acting_.contacts[j]);
-        for (int64_t l = 0; n + l < m; ++l) {
-            const int64_t offset_of_band = number - acting_.numbers[l] + half;
-            const bool near = 0 <= offset_of_band && offset_of_band < coupled.band.columns;
-            matrix(n + k, n + l) =
-                near ? -released * coupled.band(acting_.numbers[l], offset_of_band) : 0.0;
-        }
-        matrix(n + k, n + k) += 1.0;
-    }
+    const Tangents& tangents = problem.tangents;
+    press(problem.gap, tangents, problem.unknowns);
+    if (n_compensations() > 0)
+        couple(problem.share.rows, n_compensations(), problem.coupled, tangents.by_depth,
+               tangents.by_rate, problem.unknowns);
 }
 
 /// Take a group of tangents through the step that was taken.
 void TangentSteps::follow(const TangentGroup& group, int64_t number) {
     const TangentLanes& lanes = group.lanes;
-    const int64_t n_lanes = lanes.n(), m = acting_.n(), n = size(acting_.contacts);
+    const int64_t n_lanes = lanes.n(), n = n_contacts(), n_links = size(acting_.rows);
     const double time = block().times[number] - course().since;
     const int64_t n_tangents = size(group.tangents);
     const Motion& march = parts().contacts.motion;
@@ -146,8 +119,8 @@ void TangentSteps::follow(const TangentGroup& group, int64_t number) {
     }
     lanes.passes->step();
     // Of all contacts, and of acting links.
-    const Array2<double> forces{side_by_side_.data(), n_contacts(), n_lanes},
-        of_links{side_by_side_.data() + n_contacts() * n_lanes, m - n, n_lanes};
+    const Array2<double> forces{side_by_side_.data(), n, n_lanes},
+        of_links{side_by_side_.data() + n * n_lanes, n_links, n_lanes};
     std::ranges::fill(side_by_side_, 0.0);
     for (int64_t s = 0; s < n_tangents; ++s) {
         const Tangent& tangent = group.tangents[s];
@@ -157,9 +130,9 @@ void TangentSteps::follow(const TangentGroup& group, int64_t number) {
                        {place_, rate_});
         find_places(tangent, own, tangent.speed * time);
         solve(tangent, own);
-        for (int64_t i : acting_.contacts) forces(i, s) = forces_[i];
-        for (int64_t k = 0; n + k < m; ++k) of_links(k, s) = -compensations_[k];
-        heads_.move(tangent.heads, forces_);
+        for (int64_t i : acting_.contacts) forces(i, s) = solution_[i];
+        for (int64_t k = 0; k < n_links; ++k) of_links(k, s) = -solution_[n + acting_.rows[k]];
+        heads_.move(tangent.heads, solution_);
         remember(tangent);
         show(tangent, number);
     }
@@ -187,23 +160,14 @@ Array2<const double> TangentSteps::changed_drives(const Tangent& tangent, int64_
 
 /// Solve the small problem of a tangent.
 void TangentSteps::solve(const Tangent& tangent, const Motion& own) {
-    const int64_t m = acting_.n(), n = size(acting_.contacts);
-    for (int64_t i = 0; i < n; ++i) right_[i] = of_law(tangent, acting_.contacts[i]);
-    for (int64_t k = 0; n + k < m; ++k)
-        right_[n + k] = -parts().problem.coupled.released[acting_.numbers[k]] *
-                        of_reserve(tangent, own, acting_.numbers[k]);
-    Room room{};
-    room.factors = {factors_.data(), m, m};
-    room.acting = index_;
-    room.order = order_;
-    room.left = left_;
-    room.change = change_;
-    const System system{
-        {matrix_.data(), m, m}, std::span(right_).first(m), std::span(solution_).first(m)};
-    solve_on(system, {acts_.get(), static_cast<size_t>(m)}, room);
-    std::ranges::fill(forces_, 0.0);
-    for (int64_t i = 0; i < n; ++i) forces_[acting_.contacts[i]] = solution_[i];
-    std::copy_n(solution_.begin() + n, m - n, compensations_.begin());
+    const auto& [always, behind, matrix, unused, solution, room] = parts().problem.unknowns;
+    const auto& released = parts().problem.coupled.released;
+    for (int64_t i : acting_.contacts) right_[i] = of_law(tangent, i);
+    for (size_t k = 0; k < acting_.rows.size(); ++k)
+        right_[n_contacts() + acting_.rows[k]] =
+            -released[acting_.numbers[k]] * of_reserve(tangent, own, acting_.numbers[k]);
+    const int64_t n = n_contacts() + n_compensations();
+    solve_on({matrix, right_, solution_}, room->acts.first(n), *room);
 }
 
 /// Add the loads of a tangent by the march's forces, whose links or places change.
@@ -308,9 +272,9 @@ void TangentSteps::remember(const Tangent& tangent) const {
         }
         speed = rate_[i];
         for (int64_t j = 0; j < n_contacts(); ++j)
-            speed -= problem.gap.rate_by_force(i, j) * forces_[j];
-        for (size_t k = 0; k < acting_.rows.size(); ++k)
-            speed += problem.share.rows.rise(acting_.rows[k], i) * compensations_[k];
+            speed -= problem.gap.rate_by_force(i, j) * solution_[j];
+        for (int64_t k : acting_.rows)
+            speed += problem.share.rows.rise(k, i) * solution_[n_contacts() + k];
     }
 }
 
@@ -323,9 +287,9 @@ void TangentSteps::show(const Tangent& tangent, int64_t number) const {
     for (int64_t p = 0; p < n_pantographs; ++p) {
         row[p] = 0.0;
         for (int64_t i = of_strip[of_pantograph[p]]; i < of_strip[of_pantograph[p + 1]]; ++i) {
-            row[p] += gamma == 0.0 ? forces_[i]
-                                   : gamma * forces_[i] + (1.0 - gamma) * tangent.law.latest[i];
-            tangent.law.latest[i] = forces_[i];
+            row[p] += gamma == 0.0 ? solution_[i]
+                                   : gamma * solution_[i] + (1.0 - gamma) * tangent.law.latest[i];
+            tangent.law.latest[i] = solution_[i];
         }
     }
     const auto heights = row.subspan(n_pantographs + size(parts().shown.arms));

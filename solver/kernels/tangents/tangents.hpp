@@ -10,7 +10,6 @@
 //
 // by the same method and with the same factors. Contacts that touch and links that have switched
 // keep their laws, differentiated; others keep no force. Heads and contact laws likewise.
-#include "contact_problem/active_set.hpp"
 #include "steps/steps.hpp"
 #include "tangents/head_tangents.hpp"
 #include "tangents/tangent_lanes.hpp"
@@ -79,16 +78,14 @@ class TangentSteps : public Steps {
     Taken take(int64_t first, int64_t end);
 
   private:
-    /// Acting contacts and then acting links, in the order of unknowns of the tangents' small
-    /// problem.
+    /// Acting contacts, and acting links by their rows and by their numbers.
     struct Acting {
         std::vector<int64_t> contacts, rows, numbers;
-        int64_t n() const { return static_cast<int64_t>(contacts.size() + rows.size()); }
     };
 
     void find_acting();
     void count();
-    void fill_matrix();
+    void fill_matrix() const;
     void follow(const TangentGroup& group, int64_t number);
     void wake(LanePasses& passes) const;
     void solve(const Tangent& tangent, const Motion& own);
@@ -106,15 +103,11 @@ class TangentSteps : public Steps {
 
     MarchTangents tangents_;
     HeadTangents heads_;
-    std::vector<double> place_, rate_;   ///< derivatives of gaps without forces
-    std::vector<double> forces_;         ///< of contacts
-    std::vector<double> compensations_;  ///< of acting links
-    std::vector<double> side_by_side_;   ///< forces of contacts, and of acting links, in all lanes
+    std::vector<double> place_, rate_;      ///< derivatives of gaps without forces
+    std::vector<double> right_, solution_;  ///< of the small problem, in the march's unknowns
+    std::vector<double> side_by_side_;  ///< forces of contacts, and of acting links, in all lanes
     Acting acting_, was_;
     bool has_begun_ = false;
-    std::vector<double> matrix_, right_, solution_, factors_, left_, change_;
-    std::vector<int64_t> index_, order_;
-    std::unique_ptr<bool[]> acts_;
 };
 
 }  // namespace catenary

@@ -22,6 +22,12 @@ from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
 EPS = np.finfo(float).eps
 
 
+def couplings_of(line: LineResponse) -> tuple[np.ndarray, ...]:
+    """Views of the couplings of links with contacts, (m, n) each: reactions, lifts and rises."""
+    n = line.n_contacts
+    return tuple(line.rows.numbers[:, 2 + k * n : 2 + (k + 1) * n] for k in range(3))
+
+
 def coupled(coupling: np.ndarray, kept: float = 0.0) -> native.Coupled:
     """Links that slacken with couplings G (m, m) as a band: ``band[e, d - e + half]`` is G_de."""
     m = len(coupling)
@@ -54,10 +60,10 @@ class Case:
         line, force, slack = self.line, found.contact_force, found.compensation
         # No dropper is pushed where there are no compensations.
         slack = slack if slack.size else np.zeros(line.count)
-        free, rows = line.line, line.rows
-        height = free.place + free.by_force @ force - rows.lift.T @ slack
-        rate = free.rate + free.rate_by_force @ force - rows.rise.T @ slack
-        tension = rows.reserve + rows.reaction @ force - self.coupling @ slack
+        free, (reaction, lift, rise) = line.line, couplings_of(line)
+        height = free.place + free.by_force @ force - lift.T @ slack
+        rate = free.rate + free.rate_by_force @ force - rise.T @ slack
+        tension = line.rows.numbers[:, 1] + reaction @ force - self.coupling @ slack
         heads = self.heads
         depth = heads.height - heads.height_compliance @ force - height
         closing = heads.velocity - heads.velocity_compliance @ force - rate
@@ -92,10 +98,11 @@ def make_case(
     line.line.by_force[:] = position * among_contacts
     line.line.rate_by_force[:] = velocity * among_contacts
     line.count = m
-    line.rows.number[:], line.rows.reserve[:] = np.arange(m), rng.normal(size=m)
-    line.rows.reaction[:] = per_acceleration[:, None] * between
-    line.rows.lift[:] = position * between
-    line.rows.rise[:] = velocity * between
+    line.rows.numbers[:, :2] = np.stack([np.arange(m), rng.normal(size=m)], axis=1)
+    reaction, lift, rise = couplings_of(line)
+    reaction[:] = per_acceleration[:, None] * between
+    lift[:] = position * between
+    rise[:] = velocity * between
     heads = Heads(n)
     heads.height[:], heads.velocity[:] = rng.normal(size=(2, n))
     # Strips of one head move each other.
@@ -153,7 +160,7 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
     right = np.array([1.0, -2.0, 3.0])
     line = LineResponse(0, 3)
     line.count = 3
-    line.rows.number[:], line.rows.reserve[:] = np.arange(3), -right
+    line.rows.numbers[:] = np.stack([np.arange(3), -right], axis=1)
     law = LinearInSteps(LinearLaw(1.0, 0.0), 0, pulls=False)
     found = InnerProblem(law, coupled(np.eye(3) - matrix)).solve(line, Heads(0))
     solutions = []
@@ -230,7 +237,7 @@ def test_contacts_beside_droppers_that_lost_much_find_their_force() -> None:
         [-4.178905455472464e-06, 3.993942428118032e-03],
     ]
     line.count = 4
-    line.sent_rows[:] = [
+    line.rows.numbers[:] = [
         [0, -3.2008731e6, -9.9e-8, -4.8402539e-5, -1.31e-13, -6.4280368e-11, -7.8e-15, -6.85045e-9],
         [1, -3.8134575e6, -5.63e-4, -1.12034647e-1, -7.475e-10, -1.48786168e-7, -4.499e-10,
          -1.23383328e-4],

@@ -46,7 +46,7 @@ def rows(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rows]:
             bounds = scheme.share.bounds
             bounds.push[:], bounds.pull[:], bounds.loss[:] = push, pull, 1e-6
             respond()
-            return sorted(scheme.share.rows.number[: scheme.share.count].astype(int).tolist())
+            return sorted(scheme.share.links.tolist())
 
         yield found
 

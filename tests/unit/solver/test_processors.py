@@ -58,7 +58,7 @@ def answers(target: str, widths: tuple[int, ...]) -> tuple[np.ndarray, ...]:
     motion = PredictedLineState(ahead[b:-b], np.zeros(b * n), answer, shown, STEPS)
     motion.put(*state)
     parts = ByStations(product, factors, ahead, ahead, answer, 0.0)
-    passes = StationPasses(parts, rng.standard_normal(b * n), motion, STEPS)
+    passes = StationPasses(parts, rng.standard_normal(b * n), motion)
     for _ in range(2):
         passes.native.step()
     return force, solution, motion.displacement.copy(), motion.velocity

@@ -16,7 +16,7 @@ from repeating_line import layout, line, station_factors, station_product
 from catenary.mbs.interface import affine
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.line_response import LineResponse
-from catenary.solver.contact_problem.complementarity import InnerProblem, room_for
+from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.law_tangents import LinearInSteps
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import LinearLaw
@@ -28,7 +28,7 @@ def small_problem() -> object:
     """A small problem of two contacts without links, as kernels solve it."""
     heads, response = affine(np.zeros(12), 2), LineResponse(2, 0)
     inner = InnerProblem(LinearInSteps(LinearLaw(5e4, 0.0), 2, pulls=False), no_links())
-    problem, rows = inner.problem(heads, response), SimpleNamespace(numbers=response.sent_rows)
+    problem, rows = inner.problem(heads, response), SimpleNamespace(numbers=response.rows.numbers)
     return problem._replace(share=SimpleNamespace(**response.share._asdict() | {"rows": rows}))
 
 
@@ -36,7 +36,7 @@ def system(m: int) -> tuple[object, ...]:
     """A system of m unknowns, their signs, a bound of rounds, room."""
     made = SimpleNamespace(matrix=np.eye(m), right=np.ones(m), solution=np.zeros(m))
     signs = SimpleNamespace(always=np.zeros(m, dtype=bool), behind=np.zeros(m, dtype=np.int64))
-    return made, signs, 9, room_for(m)
+    return made, signs, 9, native.Room(m)
 
 
 # Calls in which no array may be shorter, along any axis, than it is.

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.solver.contact_problem.complementarity import room_for
 from catenary.solver.kernels import native
 
 SMALL = 1e-11
@@ -21,7 +20,7 @@ def find_zero(
 ) -> tuple[np.ndarray, bool]:
     """The last place looked at, and whether it is a zero."""
     at = start.copy()
-    return at, native.find_zero(of, at, width, SMALL, room_for(2 * start.size))
+    return at, native.find_zero(of, at, width, SMALL, native.Room(2 * start.size))
 
 
 def faces(matrix: np.ndarray, right: np.ndarray) -> list[np.ndarray]:

@@ -68,9 +68,7 @@ def compare(
     read, shown = others.copy(), np.zeros(b * n_own)
     motion = PredictedLineState(read[b:-b][own], np.zeros(b * n_own), answer[own], shown, STEPS)
     motion.put(displacement, velocity, answer[own].copy())
-    passes = StationPasses(
-        ByStations(product, factors, read, read, answer, 0.0), loads, motion, STEPS
-    )
+    passes = StationPasses(ByStations(product, factors, read, read, answer, 0.0), loads, motion)
     links = native.Links(ends, RNG.standard_normal(ends.shape), LAWS[: len(ends)])
     passes.track_links(links, tension)
     passes.native.step()
