@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.plain_text import plain
@@ -168,7 +168,7 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
                 f"is evaluated from {start:g} to {end:g} m"
             )
         if is_filtered:
-            curve = CubicSpline(place, force)
+            curve = curve_through(place, force)
             fine = curve(np.linspace(start, end, 1 + round((end - start) / _FINE)))
             mean, std = float(fine.mean()), float(fine.std())
             own = {
@@ -180,12 +180,21 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
             _remark_on_ends(one, of, place, dt)
             found = contact_statistics(of, place, force, np.zeros_like(force), dt, solution.stretch)
             own = {key: getattr(found, word) for key, word in _FROM_STATISTICS.items()}
-            curve = CubicSpline(place, filters.low_pass(force, dt))
+            curve = curve_through(place, filters.low_pass(force, dt))
         _check_unit(solution, of, "mean_N", own["mean_N"], name)
         one.forces[of] = curve(solution.place)
         for quantity in (column.name for column in OF_FORCE if column.name in own):
             _add(one, of, quantity, own[quantity], name)
         _add(one, of, HISTORY, rms(one.forces[of] - solution.forces[of]), name)
+
+
+def curve_through(place: np.ndarray, force: np.ndarray) -> BSpline:
+    """A curve through samples below 20 Hz.
+
+    Of degree 7: with four samples a period, as at 1 m and 80 m/s, a cubic is off by some percent of
+    what is at 20 Hz, 0.3 N at the least force of a run.
+    """
+    return make_interp_spline(place, force, 7)
 
 
 def _places_of(one: Others, of: str, table: pd.DataFrame, name: str) -> tuple[np.ndarray, float]:
