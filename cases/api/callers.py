@@ -8,7 +8,7 @@ import operator
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
@@ -102,7 +102,7 @@ def n_at_once(jobs: Any) -> int:
     )
 
 
-def listed(names: str | Sequence[str], argument: str) -> list[str]:
+def listed(names: str | Iterable[str], argument: str) -> list[str]:
     """Names of an argument, where a text is one name and not one for each of its letters.
 
     Raises InputError if it holds no names.

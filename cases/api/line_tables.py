@@ -9,7 +9,7 @@ import numpy as np
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable
     from pathlib import Path
 
     import pandas as pd
@@ -245,7 +245,7 @@ class AtRest:
 
     @property
     def steady_arms(self) -> pd.DataFrame:
-        """A row for each steady arm: ``x_m`` and, of lines that move sideways, place and forces.
+        """A row for each steady arm: ``x_m``, ``wire`` and, of lines that move sideways, forces.
 
         Then ``stagger_m`` is the place of the wire to the left of the track, ``radial_N``,
         ``lift_N`` and ``along_N`` the force of the arm on it to the left, upward and along the
@@ -254,7 +254,7 @@ class AtRest:
         Examples
         --------
         >>> catenary.static("en50318_2002").steady_arms.columns.tolist()
-        ['x_m']
+        ['x_m', 'wire']
         >>> catenary.static("ac_simple_3d").steady_arms.stagger_m.abs().max() > 0.1
         True
         """
@@ -262,13 +262,17 @@ class AtRest:
 
         from catenary.postproc.read.registration import Registration
 
+        x, numbers = self._data["arm_x"], self._data["arm_wire"].astype(int)
+        names = [name.removeprefix("wires/") for name in self._data if name.startswith("wires/")]
+        order = np.argsort(x, kind="stable")  # as in a Registration
+        columns = {"x_m": x[order], "wire": [names[number] for number in numbers[order].tolist()]}
         table = Registration.of(self._data)
         if table is None:
-            return pd.DataFrame({"x_m": np.sort(self._data["arm_x"])})
+            return pd.DataFrame(columns)
         left, up, along = table.force.T
         return pd.DataFrame(
             {
-                "x_m": table.x,
+                **columns,
                 "stagger_m": table.stagger,
                 "radial_N": left,
                 "lift_N": up,
@@ -278,7 +282,7 @@ class AtRest:
         )
 
     def sensitivity(
-        self, parameters: str | Sequence[str] = (), *, droppers: bool = False
+        self, parameters: str | Iterable[str] = (), *, droppers: bool = False
     ) -> xr.Dataset:
         """Changes of contact wires and elasticity in the middle span by parameters.
 

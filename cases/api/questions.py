@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -39,7 +39,7 @@ def highest_speeds(
     *,
     step: float = Speeds.step,
     within: float = Speeds.within,
-    criteria: str | Sequence[str] = (),
+    criteria: str | Iterable[str] = (),
     direction: str | None = None,
     jobs: int = 1,
     force: bool = False,

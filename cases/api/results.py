@@ -272,7 +272,9 @@ class Run:
         xarray.DataArray, shape (n_times, n_columns) or (n_times,)
             ``time`` [s] and, by what a column stands for, ``pantograph`` (its name), ``strip``,
             ``contact``, or ``steady_arm``, ``dropper`` and ``wire_end`` (their places [m]). Those
-            of pantographs have the places ``position`` (n_times, n_pantographs) [m]. NaN where the
+            of pantographs have the places ``position`` (n_times, n_pantographs) [m]; those of the
+            line its wires: ``wire`` of an arm or an end, which is ``outwards`` (1) where the wire
+            ends and -1 where it begins, ``hangs_from`` and ``carries`` of a dropper. NaN where the
             line is not recorded.
 
         Raises
@@ -313,7 +315,7 @@ class Run:
         results, dim = self._results, _COLUMNS[per]
         names = results.pantograph_names()
         if per in _PLACES:
-            return {dim: (dim, results.line(_PLACES[per]), _PLACE)}
+            return {dim: (dim, results.line(_PLACES[per]), _PLACE), **self._wires_at(per)}
         if per == channels.PANTOGRAPH:
             return {dim: names}
         counts = results.n_strips()
@@ -330,6 +332,21 @@ class Run:
         words = results.contact_columns()
         own = np.repeat(names, [len(one) for one in words])
         return {"contact": [word for one in words for word in one], "pantograph": (dim, own)}
+
+    def _wires_at(self, per: str) -> dict[str, Any]:
+        """What tells columns at one place apart, as of two contact wires side by side."""
+        results, dim = self._results, _COLUMNS[per]
+        if per == channels.ARM:
+            return {"wire": (dim, np.array(results.arm_wires(), dtype=str))}
+        names = np.array([*results.roles], dtype=str)
+        if per == channels.DROPPER:
+            upper, lower = results.dropper_wires().T
+            return {"hangs_from": (dim, names[upper]), "carries": (dim, names[lower])}
+        about = {"long_name": "1 where the wire ends, -1 where it begins"}
+        return {
+            "wire": (dim, names[results.line("end_wire").astype(int)]),
+            "outwards": (dim, results.line("end_outwards").astype(int), about),
+        }
 
     @property
     def force(self) -> xr.DataArray:
@@ -425,8 +442,6 @@ class Run:
 
         results, found = self._results, self._evaluated.droppers
         dim = _COLUMNS[channels.DROPPER]
-        names = np.array([*results.roles], dtype=str)
-        upper, lower = results.dropper_wires().T
         recorded = {"force": self.channel("dropper_force")} if results.has("dropper_force") else {}
 
         def column(values: np.ndarray, long_name: str, **unit: str) -> tuple[str, np.ndarray, Any]:
@@ -448,8 +463,6 @@ class Run:
             {
                 **self._columns(channels.DROPPER),
                 "span": (dim, results.line("dropper_span").astype(int) + 1),
-                "hangs_from": (dim, names[upper]),
-                "carries": (dim, names[lower]),
                 "evaluated": (dim, found.evaluated.copy()),
             },
         )

@@ -96,7 +96,7 @@ def run(
 def restart(
     folder: str | Path,
     until_m: float | None = None,
-    evaluate: Sequence[float] | None = None,
+    evaluate: Sequence[float] | np.ndarray | None = None,
     *,
     force: bool = False,
     report: bool = True,

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 class Scene:
     """A checked line with a train and a run, from ``load``. A scene does not change.
 
+    Scenes are equal where the same values hold, and can be keys of dictionaries.
+
     Keys are those of ``case.toml``, dotted: ``catenary list --keys`` lists them with unit, bounds
     and meaning. A unit stands at the end of a key; a key without one has no unit.
 
@@ -137,8 +139,24 @@ class Scene:
         """
         return self._draft.table()
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the same values hold, wherever they were written."""
+        if not isinstance(other, Scene):
+            return NotImplemented
+        return self is other or resolved(self._checked) == resolved(other._checked)
+
+    def __hash__(self) -> int:
+        return hash(_frozen(resolved(self._checked)))
+
     def __repr__(self) -> str:
         return f"<catenary.Scene {self.name}: {self.title}>"
+
+
+def _frozen(value: Any) -> Any:
+    """A value of a scene that can be hashed; whole numbers have the hash of their floats."""
+    if isinstance(value, dict):
+        return frozenset((key, _frozen(own)) for key, own in value.items())
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
 # Types that every function of a scene accepts.

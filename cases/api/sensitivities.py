@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.base.lone_process import alone
@@ -19,7 +19,7 @@ SENSITIVITIES, AT_REST = "sensitivity.csv", "sensitivity_at_rest.csv"
 
 def sensitivity(
     scene: SceneLike,
-    parameters: str | Sequence[str] = (),
+    parameters: str | Iterable[str] = (),
     *,
     droppers: bool = False,
     progress: bool = False,

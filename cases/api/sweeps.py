@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
 
 def sweep(
     scene: SceneLike,
-    vary: Mapping[str, Sequence[Any]] | None = None,
+    vary: Mapping[str, Iterable[Any]] | None = None,
     out: str | Path | None = None,
     *,
     sample: Mapping[str, Any] | str | Path | None = None,
     only_statistics: bool = False,
-    histories: str | Sequence[str] = (),
+    histories: str | Iterable[str] = (),
     jobs: int = 1,
     force: bool = False,
     progress: bool = False,
@@ -153,7 +153,7 @@ def samples_of(
     return samples(sampling, draft.scene(), where), sampling
 
 
-def _listed(vary: Mapping[str, Sequence[Any]] | None) -> list[Variant]:
+def _listed(vary: Mapping[str, Iterable[Any]] | None) -> list[Variant]:
     """The variants of lists of values."""
     if vary is not None and not isinstance(vary, Mapping):
         raise InputError(f"vary is {shown(vary)}; it must be a table of lists of values by keys")

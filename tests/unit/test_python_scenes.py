@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import pickle
@@ -117,6 +118,20 @@ def test_a_scene_stands_for_itself(scene: catenary.Scene) -> None:
     assert catenary.load(scene).to_dict() == scene.to_dict()
     short = catenary.load(scene, short=True)
     assert short.to_dict() == catenary.load(CASE, short=True).to_dict()
+
+
+def test_scenes_are_equal_where_the_same_values_hold(scene: catenary.Scene) -> None:
+    faster = scene.replace(train={"speed_km_h": scene["train.speed_km_h"] + 25})
+    assert faster != scene and not faster == scene.name
+    for same in (
+        catenary.load(scene.to_dict()),
+        pickle.loads(pickle.dumps(scene)),
+        copy.deepcopy(scene),
+        scene.replace(train={"speed_km_h": int(scene["train.speed_km_h"])}),
+        faster.replace(train={"speed_km_h": scene["train.speed_km_h"]}),
+    ):
+        assert same == scene and hash(same) == hash(scene)
+    assert {scene: 1, faster: 2}[catenary.load(faster.to_dict())] == 2
 
 
 def test_a_scene_is_no_list_and_takes_no_attribute(scene: catenary.Scene) -> None:

@@ -263,6 +263,43 @@ def test_wires_are_judged_as_they_hang(scene: catenary.Scene) -> None:
     assert found["contact_wire_strain"] == pytest.approx(1e6 * curvature * top, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("dc_twin", marks=pytest.mark.study),
+        pytest.param("overlap", marks=pytest.mark.study),
+        "tensioned_section",
+    ],
+)
+def test_columns_at_one_place_are_told_apart_by_their_wires(name: str) -> None:
+    """Two contact wires side by side have arms, droppers and ends at the same places."""
+    table = SCENES[name]
+    run = catenary.run(with_words(table["case"], table["set"]))
+    labels = {
+        "arm_uplift": ("steady_arm", "wire"),
+        "dropper_force": ("dropper", "hangs_from", "carries"),
+        "wire_end_tension": ("wire_end", "wire", "outwards"),
+    }
+    for channel in labels.keys() & {*run.channels}:
+        array = run.channel(channel)
+        own = [tuple(row) for row in zip(*(array[c].values for c in labels[channel]), strict=True)]
+        assert len({*own}) == len(own), (channel, own)
+    arms, hung = run.uplift, catenary.static(run.scene).steady_arms
+    assert hung.wire.tolist() == arms.sortby("steady_arm").wire.values.tolist()
+    assert arms.wire.values.tolist() == [
+        row["wire"] for row in run.summary["supports"]["per_support"]
+    ]
+    assert np.array_equal(run.droppers.carries, run.channel("dropper_force").carries)
+    if name == "tensioned_section":
+        tension = run.channel("wire_end_tension").isel(time=0)
+        for wire in ("contact_wire", "messenger_wire"):
+            # Friction of the tensioner takes 3 %, the warmth at the mid-point less than 1 % more;
+            # the tensions of the wires are 22 and 16 kN.
+            nominal = run.scene[f"line.{wire}.tension_N"]
+            own = tension.where(tension.wire == wire, drop=True)
+            assert np.abs(own / nominal - 1.0).max() < 0.05, wire
+
+
 def test_a_run_knows_its_scene(in_memory: catenary.Run, scene: catenary.Scene) -> None:
     assert in_memory.scene["train.end_m"] == scene["train.end_m"] == 260.0
     faster = in_memory.scene.replace(train={"speed_km_h": 255})
