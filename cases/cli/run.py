@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.base.errors import InputError
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.cli.app import (
     NamedVariants,
     NoReport,
@@ -274,7 +274,15 @@ def submit(
         console.say(_sbatch(script))
         return
     number = _sbatch(script, "--parsable").partition(";")[0]
-    last = _sbatch(script, "--parsable", "--array=0", f"--dependency=afterany:{number}")
+    try:
+        last = _sbatch(script, "--parsable", "--array=0", f"--dependency=afterany:{number}")
+    except InputError as error:
+        verb = "run --study" if study else "sweep"
+        raise RunBroken(
+            f"job {number} with its {array} tasks is submitted, the job of the table is not: "
+            f"{error}; once the tasks have ended, `catenary {verb}` with the same words and "
+            f"-o {out} writes the table"
+        ) from error
     console.say(f"job {number}: {array} tasks; job {last.partition(';')[0]}: the table, after them")
 
 

@@ -11,6 +11,8 @@ _REMEDIES = {
     errno.ENOSPC: f"free some space or {_OTHER_FOLDER}",
     errno.EDQUOT: f"free some space or {_OTHER_FOLDER}",
     errno.EFBIG: f"raise the limit on the size of a file (`ulimit -f`) or {_OTHER_FOLDER}",
+    errno.EMFILE: "raise the limit on the number of open files (`ulimit -n`)",
+    errno.ENFILE: "end programs that have many files open, the machine's limit is reached",
     errno.EACCES: f"change the permissions there or {_OTHER_FOLDER}",
     errno.EPERM: f"change the permissions there or {_OTHER_FOLDER}",
     errno.EROFS: f"nothing can be written there, {_OTHER_FOLDER}",
