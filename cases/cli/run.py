@@ -243,12 +243,15 @@ def submit(
     import shutil
 
     from catenary.cases.run.planning.slurm_script import SlurmJob, slurm_script
+    from catenary.cases.scene.input.case_files import find_case, shipped
 
     refuse_impossible(out)
     if array is None and (vary or named or study):
         raise InputError("--vary, --variants and --study belong to --array")
     chosen, options = words.split()
-    case_words = [str(Path(words.case).absolute()) if Path(words.case).exists() else words.case]
+    # A folder in this place may have the name of a shipped case, as one for its results.
+    own = words.case not in shipped()
+    case_words = [str(find_case(words.case).absolute()) if own else words.case]
     case_words += ["--short"] if words.shortened else []
     # The folder comes last, so that nothing is taken for a further assignment.
     case_words += [word for value in chosen for word in ("--set", value)]

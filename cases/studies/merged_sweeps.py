@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_there
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.histories import FILE as HISTORIES
@@ -161,7 +162,7 @@ def _endless(sampling: SamplingTable | None) -> SamplingTable | None:
 
 def _parts(folder: Path) -> list[Path]:
     """A folder with a sweep, or the folders in it that have parts of one."""
-    parts = [] if (folder / RECORD).exists() else sorted(folder.glob("part_*_of_*"))
+    parts = [] if is_there(folder / RECORD) else sorted(folder.glob("part_*_of_*"))
     return parts or [folder]
 
 

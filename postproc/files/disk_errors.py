@@ -30,12 +30,14 @@ _REMEDIES = {
 
 
 def code_of(error: Exception) -> int | None:
-    """The system's error number, also if HDF5 hides it in its text; None if there is none."""
+    """The system's error number, also if HDF5 or ffmpeg hides it in its text; None without one."""
     code = getattr(error, "errno", None)
     if code:
         return int(code)
     hidden = re.search(r"errno = (\d+)", str(error))
-    return int(hidden.group(1)) if hidden else None
+    if hidden:
+        return int(hidden.group(1))
+    return next((one for one in _REMEDIES if str(error).endswith(os.strerror(one))), None)
 
 
 def reason(error: Exception) -> str:

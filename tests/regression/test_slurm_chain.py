@@ -102,6 +102,14 @@ def test_a_job_of_several_clusters_is_cancelled_by_its_number(tmp_path: Path) ->
     assert job(script, programs, out) == (2, ["scancel left= 42"])
 
 
+def test_a_folder_with_the_name_of_a_shipped_case_is_not_the_case(tmp_path: Path) -> None:
+    (tmp_path / "ac_simple").mkdir()
+    words = ["submit", "ac_simple", "--short", "-o", "ac_simple", "--print"]
+    done = catenary(*words, cwd=tmp_path)
+    assert done.code == 0, done.stderr
+    assert "srun catenary run ac_simple --short -o " in done.stdout
+
+
 @pytest.mark.parametrize(
     ("code", "begun", "outcome", "goes_on"),
     [

@@ -9,6 +9,7 @@ import typer
 
 import catenary
 from catenary.base.errors import InputError
+from catenary.base.paths import is_folder
 from catenary.cases.cli.app import (
     Force,
     NamedVariants,
@@ -252,7 +253,7 @@ def uncertainty(
     if out is not None:
         refuse_impossible(out)
     found = catenary.uncertainty(table, sample)
-    folder = out or (table if table.is_dir() else table.parent)
+    folder = out or (table if is_folder(table) else table.parent)
     leave(folder, str(found), lambda: estimate_files(found))
 
 
