@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import gmsh
 import numpy as np
 
-from catenary.base.errors import InputError
+from catenary.base.errors import CatenaryError, InputError, RunBroken
 from catenary.base.python_signals import python_signals_kept
 from catenary.meshgen.geometry import Cuts, divisions_of, find_cuts
 from catenary.meshgen.hardware import Droppers
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import ANCHORS
+
+# The last line of a mesh file.
+_END = b"$EndElements\n"
 
 
 def write_mesh(
@@ -49,6 +53,8 @@ def write_mesh(
     InputError
         If the file cannot be written, or the line is impossible
         (see ``catenary.meshgen.geometry.find_cuts``).
+    RunBroken
+        If the disk is full; an earlier file is as it was.
     """
     if path.suffix != ".msh":
         raise InputError(f"the mesh file {path} must have a name that ends in .msh")
@@ -58,10 +64,30 @@ def write_mesh(
         gmsh.model.mesh.generate(1)
         # meshio reads 2.2 ten times faster than 4.1 when there is a curve for each gap.
         gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
-        try:
-            gmsh.write(str(path))
-        except Exception as error:  # gmsh raises nothing more particular
-            raise InputError(f"the mesh file {path} cannot be written: {error}") from error
+        _write_whole(path)
+
+
+def _write_whole(path: Path) -> None:
+    """Write the present mesh so that an earlier file stays until the new one is whole."""
+    part = path.with_name(f".{path.stem[:100]}.{os.getpid()}.part.msh")
+    try:
+        gmsh.write(str(part))
+        # On a full disk Gmsh ends in the middle of the file and says nothing.
+        with part.open("rb") as file:
+            file.seek(max(0, part.stat().st_size - len(_END)))
+            if file.read().strip() != _END.strip():
+                raise RunBroken(
+                    f"the mesh file {path} cannot be written to its end: free some space or choose "
+                    "another file"
+                )
+        part.replace(path)
+    except CatenaryError:
+        raise
+    except Exception as error:  # gmsh raises nothing more particular
+        raise InputError(f"the mesh file {path} cannot be written: {error}") from error
+    finally:
+        with suppress(OSError):
+            part.unlink()
 
 
 @contextmanager

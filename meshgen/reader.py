@@ -12,6 +12,7 @@ import meshio
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_file
 from catenary.meshgen.chains import SIMPLE, Groups, Names, assemble
 from catenary.meshgen.mesh import ANCHORS, LineMesh
 
@@ -62,7 +63,7 @@ def read_mesh(path: Path, names: Names = SIMPLE) -> LineMesh:
 
 
 def _load(path: Path) -> meshio.Mesh:
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"the mesh file {path} does not exist")
     size = path.stat().st_size
     if size > MOST_BYTES:

@@ -12,6 +12,7 @@ import numpy as np
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.options import option
 from catenary.base.parallel import on_root
+from catenary.base.paths import is_folder
 from catenary.callers import (
     communicator,
     folder_of,
@@ -196,7 +197,7 @@ def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None)
     from catenary.postproc.read.results import Results
 
     refuse_impossible(folder)
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise InputError(f"{folder} is no folder; name the folder of a run")
     if evaluate is not None and until_m is None:
         raise InputError(f"{option(*EVALUATE)} belongs to {option(*UNTIL)}")

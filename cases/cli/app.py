@@ -16,6 +16,7 @@ import typer
 
 import catenary
 from catenary.base.errors import InputError
+from catenary.base.paths import is_folder
 from catenary.cases.cli import completion
 from catenary.cases.cli.varied_words import Verb
 from catenary.cases.result_folder.output_folder import run_folder
@@ -375,7 +376,7 @@ def records_of(folder: Path) -> Records | None:
     """
     from catenary.postproc.read.guard import examined
 
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise InputError(f"{folder} is no folder; name the folder of a run")
     return examined(folder)
 

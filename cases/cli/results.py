@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import CatenaryError, InputError
+from catenary.base.paths import is_folder
 from catenary.cases.cli.app import Force, RunFolder, folder_option, records_of, serial_verb
 from catenary.cases.terminal import console
 from catenary.postproc.film.options import View
@@ -142,7 +143,9 @@ def compare(
     """Serial."""
     from catenary.postproc.read.guard import examined
 
-    tables = [one for one in (first, *others) if one.suffix.lower() == ".csv" and not one.is_dir()]
+    tables = [
+        one for one in (first, *others) if one.suffix.lower() == ".csv" and not is_folder(one)
+    ]
     if tables == others and len(others) == 1:
         _compare_measured(first, others[0], description, out, force)
         return

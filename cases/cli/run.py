@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from catenary.base.errors import InputError
+from catenary.base.errors import InputError, RunBroken
 from catenary.cases.cli.app import (
     NamedVariants,
     NoReport,
@@ -243,12 +243,15 @@ def submit(
     import shutil
 
     from catenary.cases.run.planning.slurm_script import SlurmJob, slurm_script
+    from catenary.cases.scene.input.case_files import find_case, shipped
 
     refuse_impossible(out)
     if array is None and (vary or named or study):
         raise InputError("--vary, --variants and --study belong to --array")
     chosen, options = words.split()
-    case_words = [str(Path(words.case).absolute()) if Path(words.case).exists() else words.case]
+    # A folder in this place may have the name of a shipped case, as one for its results.
+    own = words.case not in shipped()
+    case_words = [str(find_case(words.case).absolute()) if own else words.case]
     case_words += ["--short"] if words.shortened else []
     # The folder comes last, so that nothing is taken for a further assignment.
     case_words += [word for value in chosen for word in ("--set", value)]
@@ -274,7 +277,15 @@ def submit(
         console.say(_sbatch(script))
         return
     number = _sbatch(script, "--parsable").partition(";")[0]
-    last = _sbatch(script, "--parsable", "--array=0", f"--dependency=afterany:{number}")
+    try:
+        last = _sbatch(script, "--parsable", "--array=0", f"--dependency=afterany:{number}")
+    except InputError as error:
+        verb = "run --study" if study else "sweep"
+        raise RunBroken(
+            f"job {number} with its {array} tasks is submitted, the job of the table is not: "
+            f"{error}; once the tasks have ended, `catenary {verb}` with the same words and "
+            f"-o {out} writes the table"
+        ) from error
     console.say(f"job {number}: {array} tasks; job {last.partition(';')[0]}: the table, after them")
 
 

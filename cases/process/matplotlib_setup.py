@@ -52,7 +52,10 @@ def _default() -> Path:
 
 def _may_be_made(path: Path) -> bool:
     """Whether a folder is there and can be written, or can be made."""
-    there = next((one for one in (path, *path.parents) if one.exists()), None)
+    try:
+        there = next((one for one in (path, *path.parents) if one.exists()), None)
+    except OSError:  # a home that this user may not search, as that of who called sudo
+        return False
     return there is not None and there.is_dir() and os.access(there, os.W_OK | os.X_OK)
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.base.options import option
+from catenary.base.paths import is_file, is_folder, is_there
 from catenary.cases.result_folder.folder_lock import refusal
 from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.own_files import (
@@ -80,7 +81,7 @@ def prepare(folder: Path, force: bool) -> None:
 def run_folder(path: str | Path) -> Path:
     """The folder of a run, for which its result file may stand. Not collective."""
     path = Path(path)
-    return path.parent if path.name == RUN_FILE and path.is_file() else path
+    return path.parent if path.name == RUN_FILE and is_file(path) else path
 
 
 def refuse_impossible(folder: Path) -> None:
@@ -107,7 +108,7 @@ def refuse_table(path: Path, force: bool) -> None:
     Not collective.
     """
     refuse_impossible(path.parent)
-    if not force and path.exists():
+    if not force and is_there(path):
         raise InputError(f"{path} is there already; {another_folder()}, or give {force_option()}")
 
 
@@ -124,12 +125,12 @@ def force_option() -> str:
 def refuse_earlier(folder: Path, force: bool) -> None:
     """Raise InputError if a folder holds a run's results and ``force`` is not given."""
     result = folder / RUN_FILE
-    if result.is_dir() and not result.is_symlink():
+    if is_folder(result) and not result.is_symlink():
         raise InputError(f"{result} is a folder; remove it, or {another_folder()}")
     if force or not os.path.lexists(result):
         return
     what = "holds the results of an earlier run"
-    if not result.exists():
+    if not is_there(result):
         what = "is a link that leads nowhere"
     elif not _is_hdf5(result):
         what = "is there already, and is no result file"
@@ -266,13 +267,16 @@ def new_file(path: Path, suffixes: tuple[str, ...], force: bool) -> None:
     out = option("-o", "out")
     if path.suffix not in suffixes:
         raise InputError(f"{out} {path} must have a name that ends in {' or '.join(suffixes)}")
-    if path.is_dir():
+    if is_folder(path):
         raise InputError(f"{out} {path} is a folder; name a file")
-    if path.exists() and not force:
+    if is_there(path) and not force:
         raise InputError(f"{out} {path} exists already; give {force_option()} to replace it")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{out} {path} cannot be written: {error.strerror}") from error
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(f"{out} {path} cannot be written: permission denied")
+    goes_into = path if is_there(path) else path.parent
+    if not os.access(goes_into, os.W_OK):
+        read_only = os.statvfs(goes_into).f_flag & os.ST_RDONLY
+        why = "read-only file system" if read_only else "permission denied"
+        raise InputError(f"{out} {path} cannot be written: {why}")

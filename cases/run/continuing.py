@@ -14,6 +14,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.options import option
+from catenary.base.paths import is_there
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.problem import resolved
@@ -51,7 +52,7 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
     InputError
         If there is no result file, if it is done, too damaged, or still read by this process.
     """
-    if not result.exists():
+    if not is_there(result):
         raise InputError(
             f"there is no {result} to continue; start the case with "
             f"{option('`catenary run`', 'catenary.run()')}"
@@ -88,7 +89,7 @@ def _refuse_open(file: Path) -> None:
     from h5py import h5f
 
     names = [os.fsdecode(h5f.get_name(one)) for one in h5f.get_obj_ids(types=h5f.OBJ_FILE)]
-    there = filter(os.path.exists, names) if file.exists() else ()
+    there = filter(os.path.exists, names) if is_there(file) else ()
     if any(os.path.samefile(name, file) for name in there):
         raise InputError(
             f"{file} is open in this program: close() the run that reads it, then continue it"
@@ -100,7 +101,7 @@ def refuse_other_scene(result: Path, scene: Scene) -> None:
 
     For jobs, which continue what they find in their folder.
     """
-    if not result.exists():
+    if not is_there(result):
         return
     with Results(result) as results:
         config, complete = results.attributes["config"], results.complete

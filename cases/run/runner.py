@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -461,6 +462,11 @@ def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
     except (OSError, CatenaryError) as error:
         if outcome.outcome != "done":  # reported already
             return RunOutcome(outcome.outcome)
+        if not os.path.lexists(out_dir / RUN_FILE):
+            raise RunBroken(
+                f"{out_dir / RUN_FILE} was moved or removed before its report was written; where "
+                "it is now, `catenary report` writes one"
+            ) from error
         again = f"`catenary report {quote(str(out_dir))}` writes the report again"
         raise RunBroken(f"{error}; the results are complete: {again}") from error
     return RunOutcome(outcome.outcome, summary)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_there
 from catenary.cases.scene.input.case_files import CASE_FILE, find_case
 from catenary.cases.scene.input.csv_files import span_table
 from catenary.cases.scene.input.faults import SceneError
@@ -87,7 +88,7 @@ def write_case(
     OSError
         If the folder cannot be made.
     """
-    if folder.exists():
+    if is_there(folder):
         raise InputError(f"{folder} is there already: choose another name, or remove it")
     if droppers is not None and spans is None:
         raise InputError("--droppers needs --spans too: droppers hang in the spans of that file")

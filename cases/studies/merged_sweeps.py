@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_there
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.histories import FILE as HISTORIES
@@ -41,6 +42,16 @@ class Merged(NamedTuple):
     folders: dict[str, Path]
 
 
+def parts_of(folders: Sequence[Path]) -> list[Path]:
+    """Folders of sweeps; in place of one that has no table the folders of parts in it. Not
+    collective."""
+    found: list[Path] = []
+    for folder in folders:
+        parts = [] if is_there(folder / RECORD) else sorted(folder.glob("part_*_of_*"))
+        found += parts or [folder]
+    return found
+
+
 def merge(folders: Sequence[Path]) -> Merged:
     """Several sweeps as one.
 
@@ -54,7 +65,7 @@ def merge(folders: Sequence[Path]) -> Merged:
         If a folder holds no sweep, or if two contradict each other: other cases, other values of
         them, other samplings, or a variant with other assignments or other figures.
     """
-    folders = [part for folder in folders for part in _parts(folder)]
+    folders = parts_of(folders)
     records = [_record(folder) for folder in folders]
     samplings = [read_sampling_beside(folder) for folder in folders]
     first, sampling = records[0], max(samplings, key=lambda one: 0 if one is None else one.n)
@@ -157,12 +168,6 @@ def _endless(sampling: SamplingTable | None) -> SamplingTable | None:
     """A sampling without its number of samples, where that does not change the first ones."""
     extends = sampling is not None and sampling.method in ("sobol", "random")
     return sampling.model_copy(update={"n": 2}) if sampling is not None and extends else sampling
-
-
-def _parts(folder: Path) -> list[Path]:
-    """A folder with a sweep, or the folders in it that have parts of one."""
-    parts = [] if (folder / RECORD).exists() else sorted(folder.glob("part_*_of_*"))
-    return parts or [folder]
 
 
 def _record(folder: Path) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from typing import Any
 
 from catenary.base.errors import InputError
 from catenary.base.parallel import on_root
+from catenary.base.paths import is_file
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.workers import Outcome, each, in_order
 from catenary.cases.scene.input.plain_text import read_text
@@ -56,7 +57,7 @@ def read_record(path: Path) -> dict[str, Any] | None:
 
 def read_table(path: Path) -> dict[str, Any] | None:
     """A JSON table, None if there is no file or no whole table in it, which is logged."""
-    if not path.is_file():  # a pipe would be waited for
+    if not is_file(path):  # a pipe would be waited for
         return None
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

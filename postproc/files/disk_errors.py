@@ -11,6 +11,8 @@ _REMEDIES = {
     errno.ENOSPC: f"free some space or {_OTHER_FOLDER}",
     errno.EDQUOT: f"free some space or {_OTHER_FOLDER}",
     errno.EFBIG: f"raise the limit on the size of a file (`ulimit -f`) or {_OTHER_FOLDER}",
+    errno.EMFILE: "raise the limit on the number of open files (`ulimit -n`)",
+    errno.ENFILE: "end programs that have many files open, the machine's limit is reached",
     errno.EACCES: f"change the permissions there or {_OTHER_FOLDER}",
     errno.EPERM: f"change the permissions there or {_OTHER_FOLDER}",
     errno.EROFS: f"nothing can be written there, {_OTHER_FOLDER}",
@@ -28,12 +30,14 @@ _REMEDIES = {
 
 
 def code_of(error: Exception) -> int | None:
-    """The system's error number, also if HDF5 hides it in its text; None if there is none."""
+    """The system's error number, also if HDF5 or ffmpeg hides it in its text; None without one."""
     code = getattr(error, "errno", None)
     if code:
         return int(code)
     hidden = re.search(r"errno = (\d+)", str(error))
-    return int(hidden.group(1)) if hidden else None
+    if hidden:
+        return int(hidden.group(1))
+    return next((one for one in _REMEDIES if str(error).endswith(os.strerror(one))), None)
 
 
 def reason(error: Exception) -> str:

@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_file, is_folder
 from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.read.records import Records
 from catenary.postproc.read.validated_file import ValidatedFile
@@ -51,8 +52,8 @@ def examined(path: Path) -> Records | None:
         If it is no result file, or damaged so that no report can be made of it; also where HDF5
         crashes at it or does not come to an end.
     """
-    path = path / RUN_FILE if path.is_dir() else path
-    if not path.is_file():
+    path = path / RUN_FILE if is_folder(path) else path
+    if not is_file(path):
         return None
     limit = LIMIT + path.stat().st_size / PER_SECOND
     try:

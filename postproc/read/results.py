@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_file, is_folder, is_there
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.filtered_force import filtered_in
@@ -52,9 +53,9 @@ class Results(TrainOfRun):
         self, path: Path | str, records: Records | None = None, image: bytes | None = None
     ) -> None:
         path = Path(path)
-        self.path = path / RUN_FILE if path.is_dir() else path
-        if image is None and not self.path.is_file():
-            what = "is no file" if self.path.exists() else "does not exist"
+        self.path = path / RUN_FILE if is_folder(path) else path
+        if image is None and not is_file(self.path):
+            what = "is no file" if is_there(self.path) else "does not exist"
             raise InputError(f"{self.path} {what}: name a result file or its folder")
         super().__init__(ValidatedFile(self.path, records, image))
 

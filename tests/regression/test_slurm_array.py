@@ -19,8 +19,13 @@ from catenary.cases.run.planning.slurm_script import SlurmJob, array_script
 
 pytestmark = pytest.mark.process
 CASE, VARIED = "en50318_2002", "train.speed_km_h=230,250,270"
+# As SLURM's own: when it gets SIGTERM it kills what it has started, SIGUSR1 it hands on.
 SRUN = """#!/bin/bash
-exec "$@"
+"$@" & task=$!
+trap 'kill -KILL $task' TERM
+trap 'kill -USR1 $task' USR1
+while wait $task; code=$?; kill -0 $task 2>/dev/null; do :; done
+exit $code
 """
 # Notes what it is called with and prints the number of a job.
 NOTED = """#!/bin/bash
@@ -133,6 +138,19 @@ def test_the_table_waits_for_all_tasks(programs: Path, tmp_path: Path) -> None:
     assert first == "sbatch --parsable"
     assert last == "sbatch --parsable --array=0 --dependency=afterany:42"
     assert "#SBATCH --array=1-3\n" in (programs / "script").read_text()
+
+
+def test_an_array_whose_table_is_refused_is_told(programs: Path, tmp_path: Path) -> None:
+    refuses = (
+        '#!/bin/bash\n[[ "$*" != *afterany* ]] || { echo "too many jobs" >&2; exit 1; }\necho 42\n'
+    )
+    (programs / "sbatch").write_text(refuses)
+    words = ["--array", "3", "--vary", VARIED, "--short"]
+    done = catenary("submit", CASE, "-o", "out", *words, cwd=tmp_path)
+    assert done.code == 1
+    (sentence,) = done.sentences
+    assert "job 42 with its 3 tasks is submitted, the job of the table is not" in sentence
+    assert "too many jobs" in sentence and "`catenary sweep`" in sentence
 
 
 def test_a_study_is_made_in_parts_too(tmp_path: Path) -> None:

@@ -95,6 +95,21 @@ def test_bad_input_ends_the_chain(tmp_path: Path) -> None:
     assert code == 2 and calls[-1] == "scancel left= 42"
 
 
+def test_a_job_of_several_clusters_is_cancelled_by_its_number(tmp_path: Path) -> None:
+    programs, out = stand_in(tmp_path / "slurm"), tmp_path / "out"
+    (programs / "sbatch").write_text("#!/bin/bash\necho '42;cluster'\n")
+    script = slurm_script(["no_such_case"], out, SlurmJob(), 1.0, 1e9)
+    assert job(script, programs, out) == (2, ["scancel left= 42"])
+
+
+def test_a_folder_with_the_name_of_a_shipped_case_is_not_the_case(tmp_path: Path) -> None:
+    (tmp_path / "ac_simple").mkdir()
+    words = ["submit", "ac_simple", "--short", "-o", "ac_simple", "--print"]
+    done = catenary(*words, cwd=tmp_path)
+    assert done.code == 0, done.stderr
+    assert "srun catenary run ac_simple --short -o " in done.stdout
+
+
 @pytest.mark.parametrize(
     ("code", "begun", "outcome", "goes_on"),
     [

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from program import SHORT_SCENE
 from scenes import Scene, load_scene
 
+from catenary import RunBroken
 from catenary.cases.process import interrupts
 from catenary.cases.process.interrupts import STOPPING, Interrupted, Phase, Stopped, StopRequest
 from catenary.cases.run import runner
@@ -120,6 +121,21 @@ def test_a_signal_during_the_report_leaves_a_whole_result(
         f"`catenary report {tmp_path}` writes the report again"
     )
     with Results(tmp_path) as results:
+        assert results.complete
+
+
+def test_a_report_of_a_result_that_is_gone_promises_none(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+
+    def moves(work: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda *args: (out.rename(elsewhere), work(*args))
+
+    monkeypatch.setattr(report, "write_report", moves(report.write_report))
+    with pytest.raises(RunBroken, match="moved or removed before its report was written"):
+        runner.run_case(scene, out, MPI.COMM_SELF)
+    with Results(elsewhere) as results:
         assert results.complete
 
 

@@ -29,11 +29,12 @@ def test_a_home_that_can_be_written_is_left_alone(
     assert matplotlib_setup.VARIABLE not in os.environ
 
 
+@pytest.mark.parametrize("home", ["file", "x" * 300])  # a name too long cannot be looked up
 def test_without_a_home_it_is_in_a_folder_of_the_program(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / home))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "kept"))
     matplotlib_setup.choose_folder()
     assert os.environ[matplotlib_setup.VARIABLE] == str(

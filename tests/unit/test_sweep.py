@@ -19,6 +19,7 @@ from verb_runner import invoke
 import catenary
 from catenary import InputError
 from catenary.cases.result_folder import output_folder
+from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.run.planning.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
 from catenary.cases.studies.merged_sweeps import merge
@@ -435,3 +436,22 @@ def test_a_table_that_no_sweep_wrote_names_no_variants(text: str, tmp_path: Path
 def test_a_pipe_in_place_of_a_record_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "variant.json")
     assert read_record(tmp_path / "variant.json") is None
+
+
+def test_parts_in_one_folder_merge_where_no_sweep_runs(tmp_path: Path) -> None:
+    """A sweep under way would replace the merged table when it ends."""
+    variants = product([parse_vary("train.speed_km_h=200,300")], {})
+    for number, one in enumerate(variants, 1):
+        part = [replace(fake("", {}, float(number)), variant=one)]
+        write_files(tmp_path / "all" / f"part_{number}_of_2", files_of(CASE, part, None))
+    words = ["merge", str(tmp_path / "all"), "-o", str(tmp_path / "out")]
+    lock = FolderLock(tmp_path / "out", "catenary sweep")
+    try:
+        refused = invoke(*words)
+        assert refused.exit_code == 2 and "is in use by process" in refused.stderr
+        assert not (tmp_path / "out" / "sweep.csv").exists()
+    finally:
+        lock.release()
+    done = invoke(*words)
+    assert done.exit_code == 0 and "2 variants" in done.stdout, done.output
+    assert sorted(path.name for path in (tmp_path / "out").iterdir() if path.name[0] == ".") == []

@@ -9,6 +9,7 @@ import typer
 
 import catenary
 from catenary.base.errors import InputError
+from catenary.base.paths import is_folder
 from catenary.cases.cli.app import (
     Force,
     NamedVariants,
@@ -252,7 +253,7 @@ def uncertainty(
     if out is not None:
         refuse_impossible(out)
     found = catenary.uncertainty(table, sample)
-    folder = out or (table if table.is_dir() else table.parent)
+    folder = out or (table if is_folder(table) else table.parent)
     leave(folder, str(found), lambda: estimate_files(found))
 
 
@@ -264,20 +265,30 @@ def uncertainty(
     epilog="Example: catenary merge results/part_1 results/part_2 -o results/tolerances",
 )
 def merge(
-    folders: Annotated[list[Path], typer.Argument(help="Folders of sweeps, at least two.")],
+    folders: Annotated[
+        list[Path], typer.Argument(help="Folders of sweeps, at least two, or one with parts.")
+    ],
     out: Annotated[Path, folder_option("Folder for the table.")],
     force: Force = False,
 ) -> None:
     """Serial."""
+    from catenary.cases.result_folder.folder_lock import FolderLock
     from catenary.cases.studies import merged_sweeps
     from catenary.cases.studies.sweep.output import RECORD
     from catenary.cases.studies.uncertainty import output
 
-    if len(folders) < 2:
+    parts = merged_sweeps.parts_of(folders)
+    if len(parts) < 2:
         raise InputError(f"there is only {folders[0]} to merge: name at least two folders")
-    refuse_table(out / RECORD, force)
-    merged = merged_sweeps.merge(folders)
-    files, found, lacks = merged_sweeps.write(out, merged)
+    refuse_impossible(out)
+    # A sweep that runs there would replace the table when it ends.
+    lock = FolderLock(out, "catenary merge")
+    try:
+        refuse_table(out / RECORD, force)
+        merged = merged_sweeps.merge(parts)
+        files, found, lacks = merged_sweeps.write(out, merged)
+    finally:
+        lock.release()
     if found is not None:
         console.say(output.as_text(found) + "\n")
     if lacks:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_file
 from catenary.cases.cli.app import Force, SceneWords, folder_option, leave, serial_verb
 from catenary.cases.result_folder.output_folder import (
     refuse_impossible,
@@ -104,7 +105,7 @@ def waves(
         if out is None:
             raise InputError("-o is missing; it names the folder of the runs")
         return _window_error(words, out, window_error, vary or [], force)
-    if (folder / "run.h5").is_file():
+    if is_file(folder / "run.h5"):
         if obstacles:
             raise InputError(f"{folder} is a run; --obstacles is for cases")
         if out is not None or words.changes or words.shortened or not train:

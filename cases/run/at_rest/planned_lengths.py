@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import root
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_file
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.csv_files import (
     DROPPER_COLUMNS,
@@ -55,7 +56,7 @@ def take_in_lengths(folder: Path) -> float | None:
         If the file is no such table, or if no pre-sag gives these lengths.
     """
     path = folder / DROPPERS_FILE
-    if not path.is_file():
+    if not is_file(path):
         return None
     where = f"the table of droppers is {path}"
     hung = dropper_table(path, where, LENGTH_COLUMNS)

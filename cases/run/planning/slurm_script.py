@@ -7,6 +7,7 @@ it, whose lock on the folder it takes over.
 
 Of a sweep or study a job array makes the runs, a last job the table. A task that SIGTERM comes to
 asks to be started again, as SLURM does by itself after a lost node. What is done is not run again.
+Its shell hands SIGTERM on as SIGUSR1: srun kills its ranks when SIGTERM comes to srun itself.
 The last job begins when all tasks have ended; what none of them could do it does itself.
 """
 
@@ -170,7 +171,7 @@ broken() {{
         grep -s '"outcome": ' "$out/summary.json" | grep -qv '"interrupted"'
 }}
 if [ -n "$next" ] && [ "$code" -lt 128 ] && {{ [ "$code" -eq 2 ] || broken; }}; then
-    scancel "$next"
+    scancel "${{next%%;*}}"  # of several clusters sbatch prints the name as well
 fi
 exit "$code"
 """
@@ -229,7 +230,8 @@ part=
 [ "$SLURM_ARRAY_TASK_ID" -eq 0 ] || part="--part=$SLURM_ARRAY_TASK_ID/{n_tasks}"
 {before}\
 told=
-trap 'told=yes; kill -TERM "$program"' TERM
+# srun hands SIGUSR1 on to the runs, and kills them if it gets SIGTERM itself.
+trap 'told=yes; kill -USR1 "$program"' TERM
 srun catenary {words} -o "$out" -j {ranks} $part{petsc} &
 program=$!
 wait "$program"

@@ -19,6 +19,7 @@ from typing import Any
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.parallel import on_root
+from catenary.base.paths import is_file, is_there
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.petsc_options import idle_names, look_up_all_but, start_petsc
 from catenary.cases.process.workers import Outcome, WorkerLost, at_once, each
@@ -231,8 +232,8 @@ def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
             f"{another_folder()}, or give {force_option()} to replace them"
         )
     summary = read_summary(folder / SUMMARY, record)
-    missing = job.keep_results and not (folder / RUN_FILE).is_file()
-    missing = missing or (job.full_report and not (folder / "report.html").is_file())
+    missing = job.keep_results and not is_file(folder / RUN_FILE)
+    missing = missing or (job.full_report and not is_file(folder / "report.html"))
     if summary is None or missing or (measured and not record.get("measured")):
         return None
     wall = float(record.get("wall_s", 0.0))
@@ -241,7 +242,7 @@ def _found(job: Job, folder: Path, measured: bool) -> Ended | None:
 
 def _refuse_other_run(folder: Path, wanted: dict[str, Any]) -> None:
     """Refuse to replace a run that no sweep with this configuration has begun."""
-    if not (folder / RUN_FILE).exists():
+    if not is_there(folder / RUN_FILE):
         return
     try:
         with Results(folder) as results:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_file
 from catenary.cases.result_folder.output_folder import (
     another_folder,
     force_option,
@@ -97,7 +98,7 @@ def refuse_other_sweep(
     """
     refuse_impossible(out)
     path = out / "sweep.json"
-    if force or not path.is_file():
+    if force or not is_file(path):
         return
     try:
         table = json.loads(path.read_text(encoding="utf-8"))

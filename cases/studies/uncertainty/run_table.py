@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from catenary.base.errors import InputError
+from catenary.base.paths import is_file, is_folder
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.studies.sampling.distributions import ChoicesTable
 from catenary.cases.studies.sampling.tables import SamplingTable, sampling_of
@@ -170,7 +171,7 @@ def sampling_file(sampling: SamplingTable) -> dict[str, Content]:
 def read_sampling_beside(folder: Path) -> SamplingTable | None:
     """The sampling that a sweep left in its folder, None if there is none."""
     path = folder / SAMPLING
-    if not path.is_file():
+    if not is_file(path):
         return None
     try:
         raw = json.loads(path.read_text(encoding="utf-8"))
@@ -181,12 +182,12 @@ def read_sampling_beside(folder: Path) -> SamplingTable | None:
 
 def _file_of(path: Path) -> Path:
     """The file of a table: the path itself, or that of a sweep in a folder."""
-    if path.is_dir():
-        found = [path / name for name in (PARQUET, TABLE) if (path / name).is_file()]
+    if is_folder(path):
+        found = [path / name for name in (PARQUET, TABLE) if is_file(path / name)]
         if not found:
             raise InputError(f"{path} holds no table of a sweep ({TABLE})")
         return found[0]
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path} is neither a folder of a sweep nor a table of runs")
     if path.suffix not in (".csv", ".parquet"):
         raise InputError(f"{path} must end in .csv or .parquet to be read as a table of runs")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary import InputError
+from catenary import InputError, RunBroken
 from catenary.meshgen.build import make_mesh
 from catenary.meshgen.gmsh_lines import write_mesh
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
@@ -331,3 +332,21 @@ def test_an_open_session_of_the_caller_stays_open(
         assert gmsh.model.list() == ["", "of the caller"]
     finally:
         gmsh.finalize()
+
+
+def test_a_mesh_that_finds_no_room_leaves_the_earlier_file(
+    make_line: Callable[..., LineData], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a full disk Gmsh ends amid the file and says nothing."""
+    path = tmp_path / "line.msh"
+    write_mesh(line_from(make_line()), 2, path)
+    earlier, write = path.read_bytes(), gmsh.write
+
+    def writes_half(name: str) -> None:
+        write(name)
+        os.truncate(name, len(earlier) // 2)
+
+    monkeypatch.setattr(gmsh, "write", writes_half)
+    with pytest.raises(RunBroken, match="line.msh cannot be written to its end: free some space"):
+        write_mesh(line_from(make_line()), 3, path)
+    assert path.read_bytes() == earlier and list(tmp_path.iterdir()) == [path]

@@ -245,3 +245,10 @@ def test_room_is_asked_for_only_where_it_is_short() -> None:
     hidden = RuntimeError("Can't write (errno = 28, error message = 'No space left on device')")
     assert reason(hidden) == "No space left on device"
     assert "free some space" in remedy(hidden)
+
+
+def test_the_reason_of_a_failure_is_found_in_the_words_of_a_program() -> None:
+    said = OSError("[vost#1:0/gif @ 0x55] Error submitting a packet: No space left on device")
+    assert reason(said) == "No space left on device" and remedy(said).startswith("free some space")
+    assert reason(OSError("ffmpeg ended")) == "ffmpeg ended"
+    assert "ulimit -n" in remedy(OSError(errno.EMFILE, "Too many open files"))

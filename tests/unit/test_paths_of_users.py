@@ -1,0 +1,65 @@
+"""Paths that cannot be looked up: one sentence by every verb that is given one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from verb_runner import invoke
+
+from catenary import InputError
+from catenary import open as open_run
+from catenary.base import paths
+
+TOO_LONG = "x" * 300
+VERBS = {
+    "report": ["report", TOO_LONG],
+    "restart": ["restart", TOO_LONG],
+    "compare": ["compare", TOO_LONG, "other"],
+    "worst": ["worst", TOO_LONG],
+    "waves": ["waves", TOO_LONG],
+    "merge": ["merge", TOO_LONG, "other", "-o", "out"],
+    "uncertainty": ["uncertainty", TOO_LONG],
+    "static": ["static", "ac_simple", "-o", f"{TOO_LONG}.csv"],
+    "submit": ["submit", TOO_LONG, "-o", "out", "--print"],
+    "new": ["new", TOO_LONG],
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_name_that_is_too_long_is_told(
+    verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = invoke(*VERBS[verb])
+    told = result.stderr.strip()
+    assert result.exit_code == 2 and told.startswith("catenary: ") and "\n" not in told, told
+    wanted = ("File name too long", "there is no case or file", "it must be a path")
+    assert any(words in told for words in wanted), told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_of_another_user_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Said by the system to all but root."""
+
+    stat = os.stat
+
+    def refuses(path: Any, **how: Any) -> os.stat_result:
+        if Path(path).name == "theirs":
+            raise PermissionError(13, "Permission denied", str(path))
+        return stat(path, **how)
+
+    told = r"/theirs cannot be looked up \(Permission denied\): ask the owner"
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "stat", refuses)
+        for asks in (paths.is_file, paths.is_folder, paths.is_there, open_run):
+            with pytest.raises(InputError, match=told):
+                asks(tmp_path / "theirs")
+
+
+def test_links_in_a_circle_name_nothing(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to("a")
+    assert not paths.is_there(tmp_path / "a") and not paths.is_file(Path("a\0b"))
+    assert paths.is_folder(tmp_path) and not paths.is_there(tmp_path / "a" / "b")
