@@ -102,7 +102,7 @@ def _heads(runs: Sequence[Results]) -> list[str]:
             f"{letter} from {run.evaluation[0]:g} to {run.evaluation[1]:g} m"
             for letter, run in zip(ascii_uppercase, runs, strict=False)
         )
-        lines.append(f"evaluated are different stretches: {stretches}")
+        lines.append(f"the evaluated stretches differ: {stretches}")
     return lines
 
 

@@ -132,8 +132,8 @@ def test_noise_that_was_stated_is_beside_what_remains(run: Path, table: pd.DataF
     assert not any("stated noise" in text for text in told[2.0])
     (text,) = (text for text in told[0.5] if "stated noise" in text)
     # The root of 2^2 - 0.5^2, of noise with 3 % of its own.
-    assert "the stated noise is 0.50 N" in text
-    assert float(text.split(": ")[2].split(" N")[0]) == pytest.approx(1.94, rel=0.1)
+    assert "the stated noise of 0.50 N: run" in text
+    assert float(text.split("differ by ")[1].split(" N")[0]) == pytest.approx(1.94, rel=0.1)
 
 
 def test_a_damaged_run_is_told_and_one_that_ends_before_the_stretch_refused(
@@ -145,7 +145,7 @@ def test_a_damaged_run_is_told_and_one_that_ends_before_the_stretch_refused(
     assert any("time is damaged from record" in one for one in found_in(tmp_path, table).remarks)
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         file["time"][300:] = np.nan
-    words = r"from 65 to 106\.\d+ m, and nothing of what is compared, 120 to 420 m"
+    words = r"from 65 to 106\.\d+ m, outside of the compared stretch, 120 to 420 m"
     with pytest.raises(InputError, match=words):
         found_in(tmp_path, table)
 
@@ -157,8 +157,8 @@ def test_noise_of_heights_is_beside_what_remains(run: Path, table: pd.DataFrame)
     remarks = found_in(run, table, measured={**PLACES, "head_height": column}).remarks
     (text,) = (text for text in remarks if "stated noise" in text)
     # The root of 4^2 - 1^2, of noise with 3 % of its own.
-    assert "the stated noise is 1.00 mm" in text
-    assert float(text.split(": ")[2].split(" mm")[0]) == pytest.approx(3.87, rel=0.1)
+    assert "the stated noise of 1.00 mm: run" in text
+    assert float(text.split("differ by ")[1].split(" mm")[0]) == pytest.approx(3.87, rel=0.1)
 
 
 def test_forces_of_another_world_are_not_aligned(run: Path, table: pd.DataFrame) -> None:
@@ -484,7 +484,7 @@ def test_stretches_that_differ_are_told(run: Path, tmp_path: Path) -> None:
     shutil.copy(run / "run.h5", tmp_path)
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         file["line/evaluation_range"][...] = [120.0, 405.0]
-    told = "evaluated are different stretches: A from 120 to 420 m, B from 120 to 405 m"
+    told = "the evaluated stretches differ: A from 120 to 420 m, B from 120 to 405 m"
     assert told in compare(run, tmp_path).splitlines()
     assert "different stretches" not in compare(run, run)
 
@@ -567,7 +567,7 @@ def test_a_file_with_the_usual_names_needs_no_description(
         (
             "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
             "from_m = 1000.0\nto_m = 2000.0",
-            "and nothing of what is compared, 1000 to 2000 m",
+            "outside of the compared stretch, 1000 to 2000 m",
         ),
     ],
 )

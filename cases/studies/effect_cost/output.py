@@ -125,9 +125,8 @@ def as_text(found: Costs) -> str:
     lines = [
         f"{found.case}: evaluated from {start:g} to {end:g} m; {counted(rounds, 'repetition')} of "
         f"{counted(found.n_steps, 'step')} in turns.",
-        "Forces in N, uplift in mm; of an effect that is switched, what changes. cost: how many "
-        "times as long",
-        "a step takes with the effect as without, the median of the repetitions.",
+        "Forces in N, uplift in mm; the row of an effect shows the changes when it is switched.",
+        "cost: time of a step with the effect over that without, the median of the repetitions.",
     ]
     if len(found.names) > 1:
         lines.append(f"Forces are those of {found.names[0]}, which leads.")
