@@ -370,7 +370,10 @@ def test_a_report_shows_measured_costs_of_effects(folder: Path, tmp_path: Path) 
     assert "catenary report --cost STUDY shows it here" in without
     invoke("report", str(tmp_path), "--cost", str(cost_study(tmp_path, "ac_simple", on=True)))
     words = words_of((tmp_path / "report.html").read_text())
-    assert "it costs 1.25 times; without it sigma changes by +10 %, most of all: keep it." in words
+    assert (
+        "it makes a step 1.25 times as long; without it sigma changes most, by +10 %: keep it."
+        in words
+    )
     assert f"costs and changes are those of {tmp_path}" in words
     assert "--cost STUDY" not in words
 

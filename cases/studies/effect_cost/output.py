@@ -91,8 +91,8 @@ def advice(found: Costs, row: Measured) -> str:
 
 def _price(cost: float) -> str:
     if abs(cost - 1.0) <= _SAME_COST:
-        return "costs nothing that can be measured"
-    return f"costs {cost:.2f} times" if cost > 1.0 else f"makes steps cheaper, {cost:.2f} times"
+        return "has no measurable cost"
+    return f"makes a step {cost:.2f} times as long"
 
 
 def _words(found: Costs, change: Change, on: bool) -> str:
@@ -105,7 +105,7 @@ def _words(found: Costs, change: Change, on: bool) -> str:
     of = " of the mean" if change.figure in ("max_N", "min_N") else ""
     percent = 100 * change.share
     number = f"{percent:+.0f}" if abs(percent) >= 10 else f"{percent:+.2g}"
-    return f"{what} changes by {number} %{of}, most of all"
+    return f"{what} changes most, by {number} %{of}"
 
 
 def width_text(size: Size) -> str:
