@@ -85,7 +85,7 @@ def highest_speeds(
     Raises
     ------
     InputError
-        If the range is empty, if no speed can be run, if no criterion has a wanted name, if the
+        If the range is invalid, if no speed can be run, if no criterion has a wanted name, if the
         line cannot be turned for the one ``direction``, or if ``out`` cannot be taken.
     KeyboardInterrupt
         If a signal ended it. With ``out`` the same call goes on.
@@ -151,7 +151,7 @@ def separations(
     Raises
     ------
     InputError
-        If the range is empty, if nothing can be run, or if ``out`` cannot be taken.
+        If the range is invalid, if nothing can be run, or if ``out`` cannot be taken.
     KeyboardInterrupt
         If a signal ended it. With ``out`` the same call goes on.
 
