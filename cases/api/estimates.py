@@ -39,9 +39,9 @@ class Uncertainty:
     sensitivity : pandas.DataFrame
         Sensitivity indices of each statistic and key.
     method : str
-        Which sensitivity indices these are.
+        Kind and source of the sensitivity indices.
     notes : list of str
-        Sentences on what is left out.
+        Sentences on data and estimates that are left out.
 
     Examples
     --------
@@ -95,8 +95,8 @@ def uncertainty(
     Parameters
     ----------
     table : DataFrame, mapping, str or Path
-        What ``catenary.sweep`` returns, or columns like its; the folder of a sweep; or such a table
-        as a file, ``.csv`` or ``.parquet``.
+        A table as ``catenary.sweep`` returns it, or columns like it; the folder of a sweep; or such
+        a table as a file, ``.csv`` or ``.parquet``.
     sample : mapping, str or Path, optional
         The sampling file of the table, or its tables; of a folder the one that is in it. Without
         one the columns between ``variant`` and ``outcome`` are the inputs.
@@ -108,7 +108,7 @@ def uncertainty(
     Raises
     ------
     InputError
-        If it is no table of runs.
+        If the table is not one of runs.
 
     Examples
     --------

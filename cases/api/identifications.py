@@ -34,7 +34,7 @@ class Identified:
         Directions in the space of parameters, in deviations of their priors, with their
         ``information``: below 1 the prior says more than the data.
     residuals : pandas.DataFrame
-        By place, what was measured and what the found parameters give.
+        By place: measured values, and values of the march with the found parameters.
     summary : dict
         As ``identification.json``: chi-square and whiteness of the residuals, the verdict.
 

@@ -50,7 +50,7 @@ class Optimum:
     constraints_kept : bool
         Whether all constraints are kept.
     not_improved : list of str
-        Sentences on what gets worse somewhere; empty if nothing does in any check.
+        Sentences on figures that get worse in any check; empty if none does.
     checks : pandas.DataFrame
         A row for each pantograph of each scene under each check, as in ``checks_*.csv``.
     droppers : pandas.DataFrame
@@ -105,7 +105,7 @@ def optimise(
         Variables, objective, constraints and scenes: the file that ``catenary optimise`` takes, or
         its tables.
     out : str or Path, optional
-        Folder into which all is written that ``catenary optimise -o`` writes. Runs that are kept
+        Folder for the files that ``catenary optimise -o`` writes. Runs that are kept
         there are not made again.
     jobs : int
         Processes that share the runs, 0 for one on each core.
@@ -122,7 +122,7 @@ def optimise(
     Raises
     ------
     InputError
-        If the task or a scene of it is wrong.
+        If the task, or one of its scenes, is wrong.
 
     Examples
     --------
@@ -190,7 +190,7 @@ def tolerance(
     Raises
     ------
     InputError
-        If the task or a scene of it is wrong.
+        If the task, or one of its scenes, is wrong.
 
     Examples
     --------

@@ -57,7 +57,7 @@ def highest_speeds(
     slowest, fastest : float
         Range of speeds [km/h].
     out : str or Path, optional
-        Folder into which all is written that ``catenary speed -o`` writes. A search that was
+        Folder for the files that ``catenary speed -o`` writes. A search that was
         stopped goes on there.
     step : float
         Distance of the speeds marched first [km/h]. Narrower stretches may be missed.
@@ -85,7 +85,7 @@ def highest_speeds(
     Raises
     ------
     InputError
-        If the range is none, if no speed can be run, if no criterion has a wanted name, if the
+        If the range is invalid, if no speed can be run, if no criterion has a wanted name, if the
         line cannot be turned for the one ``direction``, or if ``out`` cannot be taken.
     KeyboardInterrupt
         If a signal ended it. With ``out`` the same call goes on.
@@ -137,7 +137,7 @@ def separations(
     nearest, farthest, step : float
         Distances [m]: from ``nearest`` on, ``step`` apart, at least 0.001, ``farthest`` at most.
     out : str or Path, optional
-        Folder into which all is written that ``catenary separation -o`` writes. Marches that were
+        Folder for the files that ``catenary separation -o`` writes. Marches that were
         stopped go on there.
     jobs, force, progress
         As for ``highest_speeds``.
@@ -151,7 +151,7 @@ def separations(
     Raises
     ------
     InputError
-        If the range is none, if nothing can be run, or if ``out`` cannot be taken.
+        If the range is invalid, if nothing can be run, or if ``out`` cannot be taken.
     KeyboardInterrupt
         If a signal ended it. With ``out`` the same call goes on.
 

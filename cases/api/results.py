@@ -237,7 +237,7 @@ class Run:
 
     @property
     def remarks(self) -> list[str]:
-        """Sentences on what decides the results, and on what could not be evaluated.
+        """Sentences on what the results depend on, and on figures that could not be evaluated.
 
         Examples
         --------
@@ -499,7 +499,7 @@ class Run:
 def open(folder: str | Path) -> Run:
     """The results of a run that the program or ``run`` wrote, done or not. Not collective.
 
-    The file is looked through for damage first, in a process of its own.
+    The file is first checked for damage, in a process of its own.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ def run(
     scene : Scene, str, Path or mapping
         The scene, or whatever ``load`` takes for one.
     out : str or Path, optional
-        Folder into which all is written that ``catenary run -o`` writes: results, report, pictures,
+        Folder for the files that ``catenary run -o`` writes: results, report, pictures,
         snapshots of the moving line. Without it results are kept in memory, without snapshots.
     force : bool
         Whether results that are in ``out`` are replaced, and whether a run may be larger than

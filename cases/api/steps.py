@@ -47,7 +47,7 @@ def prepare(scene: SceneLike, out: str | Path, *, force: bool = False) -> Path:
     Raises
     ------
     InputError
-        If the scene is wrong, if its steps need what a prepared line has not (``docs/embedding.md``
+        If the scene is wrong, if its steps need what a prepared line lacks (``docs/embedding.md``
         lists it), or if the file is there, or cannot be written.
 
     Examples
@@ -78,7 +78,7 @@ class Simulation:
     Raises
     ------
     InputError
-        If the scene is wrong, if its steps need what a prepared line has not (``docs/embedding.md``
+        If the scene is wrong, if its steps need what a prepared line lacks (``docs/embedding.md``
         lists it), or if the file is damaged or of another version.
 
     Examples

@@ -61,7 +61,7 @@ def sweep(
     vary : mapping, optional
         Values by dotted keys, for instance ``{"train.speed_km_h": [250, 275]}``.
     out : str or Path, optional
-        Folder into which all is written that ``catenary sweep -o`` writes: a folder for each
+        Folder for the files that ``catenary sweep -o`` writes: a folder for each
         variant, tables and pictures. What is done there already is not run again.
     sample : mapping, str or Path, optional
         In place of ``vary``: a sampling file, or its tables, with a distribution for each key.

@@ -38,7 +38,7 @@ class Speeds:
         Raises
         ------
         InputError
-            If the range is none, or the division too fine.
+            If the range is invalid, or the division too fine.
         """
         _refuse_no_range(self, ("slowest", "fastest"), "speeds", _SPEEDS, "km/h")
         step, within = named(self, "step"), named(self, "within")
@@ -75,7 +75,7 @@ class Distances:
         Raises
         ------
         InputError
-            If the range is none, or the division too fine.
+            If the range is invalid, or the division too fine.
         """
         _refuse_no_range(self, ("nearest", "farthest"), "distances", _DISTANCES, "m")
         step = named(self, "step")

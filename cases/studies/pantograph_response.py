@@ -20,6 +20,7 @@ from catenary.mbs.build import PantographData
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
 from catenary.mbs.response.frequency_response import HeadResponse, head_response, peaks
 from catenary.mbs.response.lumped_fit import ChainFit, fit_chain
+from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     LIGHT,
@@ -106,8 +107,8 @@ def study_text(found: PantographStudy) -> str:
     ]
     if model.n_left_out:
         parts[-1] += (
-            f"\nleft out: {model.n_left_out} that nothing resists and the head does not drive, of "
-            f"{', '.join(model.left_out)}"
+            f"\nleft out: {counted(model.n_left_out, 'mode')} without stiffness that the head does "
+            f"not excite, of {', '.join(model.left_out)}"
         )
     head = f"lumped model fitted from {fit.lowest:g} to {fit.highest:g} Hz: {fit_error(fit)}"
     columns = zip(fit.data.masses, fit.data.stiffnesses, fit.data.dampings, strict=True)
@@ -126,7 +127,7 @@ def _at_rest(found: PantographStudy) -> Iterator[str]:
     response = found.response
     rows = [("force on the head", response.static_force, "N")]
     if isinstance(found.data, MultibodyData):
-        standing, given = stand(found.data), "static force with the force given for it"
+        standing, given = stand(found.data), "static force with the given actuator force"
         if standing.actuator_force is not None:
             rows.append((f"force of {found.data.actuator}", standing.actuator_force, "N"))
             rows.append((given, standing.force_before, "N"))
@@ -136,18 +137,22 @@ def _at_rest(found: PantographStudy) -> Iterator[str]:
     yield _figures("at rest under the wire", rows)
     if isinstance(found.data, MultibodyData):
         missed = [(miss.joint, 1e3 * miss.gap, "mm") for miss in stand(found.data).missed]
-        yield _figures("joints missed in the given positions, before assembly", missed)
+        yield _figures("closure errors of joints before assembly", missed)
 
 
 def _modes(response: HeadResponse) -> StudyTable:
     rows = []
     for mode in response.model.modes():
-        cells: list[str | None] = ["swings", f"{mode.frequency:.4g}", f"{mode.damping_ratio:.4g}"]
+        cells: list[str | None] = [
+            "oscillates",
+            f"{mode.frequency:.4g}",
+            f"{mode.damping_ratio:.4g}",
+        ]
         if mode.root.imag == 0.0:
-            cells = ["grows" if mode.root.real > 0.0 else "dies out", None, None]
-        moves = "" if mode.share > UNMOVED else "the head stays where it is"
+            cells = ["grows" if mode.root.real > 0.0 else "decays", None, None]
+        moves = "" if mode.share > UNMOVED else "the head does not move"
         rows.append([*cells, f"{mode.root.real:+.4g}", moves])
-    return texts_table(["free motions", "Hz", "damping ratio", "1/s", ""], rows, right=(1, 2, 3))
+    return texts_table(["modes", "Hz", "damping ratio", "1/s", ""], rows, right=(1, 2, 3))
 
 
 def _peaks(found: PantographStudy) -> str:

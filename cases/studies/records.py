@@ -93,7 +93,7 @@ def read_study(path: Path, verb: str) -> dict[str, Any]:
 def is_whole(path: Path, whole: bool) -> bool:
     """Log that a file is damaged, if it is; returns whether it is not."""
     if not whole:
-        logger.warning("%s is damaged: what it is of is done again", path)
+        logger.warning("%s is damaged: its part of the study is repeated", path)
     return whole
 
 

@@ -349,7 +349,7 @@ def describe(data: MultibodyData) -> str:
 def describe_assembly(missed: tuple[Miss, ...]) -> str:
     """Sentence on the gaps of joints in the given positions [mm]."""
     listed = ", ".join(f"{miss.joint} {1e3 * miss.gap:.1f} mm" for miss in missed)
-    return f"joints missed before assembly by: {listed}"
+    return f"closure errors of joints before assembly: {listed}"
 
 
 def without_head(data: MultibodyData, system: System) -> System:

@@ -102,7 +102,7 @@ def _heads(runs: Sequence[Results]) -> list[str]:
             f"{letter} from {run.evaluation[0]:g} to {run.evaluation[1]:g} m"
             for letter, run in zip(ascii_uppercase, runs, strict=False)
         )
-        lines.append(f"evaluated are different stretches: {stretches}")
+        lines.append(f"the evaluated stretches differ: {stretches}")
     return lines
 
 
@@ -118,7 +118,7 @@ def _statistics(runs: Sequence[_Evaluated]) -> list[str]:
     for of_all in zip(*(one.pantographs for one in found), strict=False):
         lines.append(" / ".join(dict.fromkeys(one.name for one in of_all)))
         for label, name, factor in _FORCES:
-            lines.append(_row("  " + label, [factor * getattr(one, name) for one in of_all]))
+            lines.append(table_row("  " + label, [factor * getattr(one, name) for one in of_all]))
     counts = [len(one.pantographs) for one in found]
     if len(set(counts)) > 1:
         named = zip(letters[1:], counts[1:], strict=True)
@@ -128,10 +128,10 @@ def _statistics(runs: Sequence[_Evaluated]) -> list[str]:
         )
     lines += [
         "line",
-        _row("  max uplift at arms [mm]", [1e3 * one.supports.maximum for one in found]),
-        _row("  droppers slackened", [one.droppers.n_slackened for one in found], 0),
-        _row("  max dropper force [N]", [one.droppers.maximum for one in found]),
-        _row("  min dropper force [N]", [one.droppers.minimum for one in found]),
+        table_row("  max uplift at arms [mm]", [1e3 * one.supports.maximum for one in found]),
+        table_row("  droppers slackened", [one.droppers.n_slackened for one in found], 0),
+        table_row("  max dropper force [N]", [one.droppers.maximum for one in found]),
+        table_row("  min dropper force [N]", [one.droppers.minimum for one in found]),
     ]
     lines += _acceptance(*runs)
     for _, statistics in runs:
@@ -180,12 +180,26 @@ def _judged(one: Criterion | None) -> str:
     return f"{fixed(one.value, digits)} {one.unit} {_WORDS[one.passed]}{mark}"
 
 
-def _row(label: str, values: Sequence[float], digits: int = 4) -> str:
+def table_row(label: str, values: Sequence[float], digits: int | None = None) -> str:
+    """Values and their differences from the first, by default with the decimals that show these."""
     first, *others = values
+    if digits is None:
+        digits = _decimals([abs(value - first) for value in others], not any(values))
     cells = [f"{fixed(value, digits):>14}" for value in values]
     return f"{label:34}" + "".join(
         cells + [f"{_difference(value - first, digits):>14}" for value in others]
     )
+
+
+def _decimals(differences: Sequence[float], all_zero: bool) -> int:
+    """Decimals, 1 to 4, that show the smallest difference to two digits.
+
+    Equal values get all four, which tell how far they are equal, but zeros one.
+    """
+    apart = [value for value in differences if 0.0 < value < np.inf]
+    if not apart:
+        return 1 if all_zero else 4
+    return int(np.clip(1 - np.floor(np.log10(min(apart))), 1, 4))
 
 
 def _difference(value: float, digits: int = 4) -> str:

@@ -365,7 +365,7 @@ def _mesh_warning(resolved: float, required: float) -> list[str]:
     if resolved >= required:
         return []
     needs = (
-        f"20 Hz at the pantograph send waves ahead that are as short as those of {required:.0f} Hz"
+        f"20 Hz at the pantograph excite waves ahead as short as those of {required:.0f} Hz"
         if np.isfinite(required)
         else "the train is as fast as the waves, which no mesh resolves"
     )

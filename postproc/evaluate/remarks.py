@@ -82,7 +82,7 @@ def _about_iterations(results: Results) -> list[str]:
     return [
         f"{above} of {counted['steps']} steps ended above the tolerances of the fixed-point "
         f"correction, because numerics.iterations = {fixed:g} ends each: their forces and motions "
-        "do not belong together. Take more, or leave the key out."
+        "are not consistent. Take more iterations, or leave the key out."
     ]
 
 
@@ -126,8 +126,8 @@ def _about_incidents(results: Results) -> list[str]:
         if evaluated.any():
             last = results.time_at(part.start + int(np.flatnonzero(evaluated)[-1]))
     return [
-        f"At {fact['time_s']:.4g} s {fact['says']}. The statistics of the evaluated stretch cover "
-        "what comes of it: they are not those of a sound line under sound pantographs."
+        f"At {fact['time_s']:.4g} s {fact['says']}. The statistics of the evaluated stretch "
+        "include its consequences: they do not describe an intact line under intact pantographs."
         for fact in found
         if fact["time_s"] < last
     ]
@@ -192,8 +192,8 @@ def _about_stops(results: Results) -> list[str]:
     return [
         f"{counted(stopped.size, 'tensioner')} met a stop, the one at "
         f"{results.line('end_x')[most]:g} m with {1e-3 * force[most]:.3g} kN the most: its wire "
-        "has not the tension of its weights. `catenary static` prints tensions at rest; take a "
-        "larger line.tensioner.travel_m, or a shorter section."
+        "does not have the tension of its weights. `catenary static` prints tensions at rest; take "
+        "a larger line.tensioner.travel_m, or a shorter section."
     ]
 
 
@@ -221,8 +221,8 @@ def _about_head(mass: float, stiffness: float, dt: float) -> list[str]:
     if frequency < _FELT_HZ:
         where = "inside" if frequency < CUT_OFF else "near"
         result.append(
-            f"{begin}, {where} the 20 Hz band: contact.stiffness_N_per_m is part of the "
-            "result. Figures of other contact stiffnesses cannot be compared with these."
+            f"{begin}, {where} the 20 Hz band: results depend on "
+            "contact.stiffness_N_per_m. Compare them only with results of the same stiffness."
         )
     if omega * dt > _RESOLVED:
         result.append(

@@ -35,9 +35,11 @@ class ForceChart:
 
     def __init__(self, axes: Axes, data: FilmData, rows: tuple[int, int], width: float) -> None:
         self._axes, self._data, self._first = axes, data, rows[0]
-        shown = data.force[rows[0] : rows[1]]
-        low, high = float(shown.min(initial=0.0)), float(shown.max(initial=1.0))
-        axes.set(xlabel="position along the track [m]", ylabel="force [N]")
+        # A filter swings below zero after a loss of contact, where the force itself is zero.
+        shown = np.stack([data.force[slice(*rows)], data.filtered[slice(*rows)]])
+        low = float(np.nanmin(shown, initial=0.0))
+        high = float(np.nanmax(shown, initial=1.0))
+        axes.set(xlabel="position along the track [m]", ylabel="contact force [N]")
         axes.set_ylim(1.05 * low, 1.05 * high)
         steps = np.outer([1.0, 10.0, 100.0, 1000.0], [1.0, 2.0, 5.0]).ravel()
         axes.xaxis.set_major_locator(MultipleLocator(steps[steps > width / _MOST_MARKS].min()))

@@ -133,7 +133,7 @@ class _Comparing:
         force = self._without_gaps(own.force, name, "sample")
         if force is None:
             share = 100.0 * float(np.mean(~measured))
-            text = f"{name}: {share:.0f} % of the measured forces are no numbers"
+            text = f"{name}: {share:.0f} % of the measured forces are not numbers"
             self._find("missing pantograph", name, text)
             return
         expected = run.below(passage.cut_off)(run.position)
@@ -153,7 +153,7 @@ class _Comparing:
         if begin >= end:
             raise InputError(
                 f"{self._results.path} has the {name} from {run.position[0]:g} to "
-                f"{run.position[-1]:g} m, and nothing of what is compared, {passage.stretch[0]:g} "
+                f"{run.position[-1]:g} m, outside of the compared stretch, {passage.stretch[0]:g} "
                 f"to {passage.stretch[1]:g} m"
             )
         length = float(place[-1] - place[0]) if place.size else 0.0
@@ -176,7 +176,7 @@ class _Comparing:
         if np.count_nonzero(within) < 20:
             raise InputError(
                 f"{passage.name} has positions from {at[0]:.1f} to {at[-1]:.1f} m, and the run is "
-                f"compared from {begin:g} to {end:g} m: they share nothing"
+                f"compared from {begin:g} to {end:g} m: they do not overlap"
             )
         at, force = at[within], force[within]
         wave = run.speed / passage.cut_off
@@ -243,8 +243,8 @@ class _Comparing:
             ratio = np.log(found.residual / max(there.residual, 1e-9))
             if 2.0 * found.n_independent * ratio > CERTAIN:
                 text = (
-                    f"{self._names[number]}: the measured force is rather that of the {name} "
-                    f"pantograph ({there.residual:.1f} N remain, not {found.residual:.1f} N)"
+                    f"{self._names[number]}: the measured force fits the {name} pantograph better "
+                    f"(residual {there.residual:.1f} N, not {found.residual:.1f} N)"
                 )
                 return text, float(other)
         return None
@@ -266,8 +266,8 @@ class _Comparing:
         if stated and floor > _MORE_THAN_NOISE * stated:
             more = np.sqrt(floor**2 - stated**2)
             self._found.remarks.append(
-                f"{name}: of the {what} the stated noise is {stated:.2f} {unit}: {more:.2f} {unit} "
-                "are not of it, and the run differs from the measurement by so much"
+                f"{name}: the {what} exceeds the stated noise of {stated:.2f} {unit}: run and "
+                f"measurement differ by {more:.2f} {unit} beyond it"
             )
 
     # ---- figures --------------------------------------------------------------------------------
@@ -317,7 +317,9 @@ class _Comparing:
         height = self._without_gaps(own.head_height, name, "head height")
         chosen = self._passage.untouched(known, dt)[valid][within]
         if height is None or not chosen.any():
-            text = f"{name}: {np.sum(~known)} head heights are no numbers: heights are not compared"
+            text = (
+                f"{name}: {np.sum(~known)} head heights are not numbers: heights are not compared"
+            )
             self._find("gaps", name, text, float(np.sum(~known)))
             return None
         measured = np.where(chosen, self._passage.in_band(height, dt)[valid][within], np.nan)

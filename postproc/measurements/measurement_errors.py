@@ -61,7 +61,10 @@ def errors_of(
         yield Finding("gain", name, f"{name}: {_gain_words(found)}", found.gain.value)
     elif found.both_certainty > CERTAIN and found.gain_beside_offset.differs(1.0, FORCE_SHARE):
         gain = found.gain_beside_offset
-        text = f"{name}: the force swings {gain.value:.3f} (+- {gain.deviation:.2g}) times as much"
+        text = (
+            f"{name}: the measured force fluctuates {gain.value:.3f} (+- {gain.deviation:.2g}) "
+            "times as much as that of the run"
+        )
         yield Finding("gain", name, text, gain.value)
     spread = float(np.std(run.below(passage.cut_off)(run.position)))
     if found.filter_certainty > CERTAIN and found.filter_effect > _FILTER_SHARE * spread:

@@ -24,7 +24,7 @@ class InputError(CatenaryError):
     Attributes
     ----------
     faults : tuple of (key, sentence), at least one
-        All that is wrong with a scene, the most likely cause first. What is no scene's fault is one
+        All faults of a scene, the most likely cause first. Any other fault is one
         sentence with an empty key.
     """
 
@@ -45,7 +45,7 @@ class RunBroken(CatenaryError):
     Attributes
     ----------
     run : catenary.Run or None
-        What was recorded up to there, where ``catenary.run`` raises it.
+        The record up to there, where ``catenary.run`` raises it.
     """
 
     exit_code = 1

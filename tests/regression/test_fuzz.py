@@ -69,7 +69,7 @@ MAY_STOP = (
 NOT_AT_REST = (
     "would be slack at",
     "would have a length of",
-    "finds no rest",
+    "has no static equilibrium",
     "above its place at the installation",
     "is periodic, which repeats",
     "is periodic, but this line cannot go on",
@@ -81,7 +81,7 @@ PLANES = ("axial_motion", "lateral_motion")
 
 # What an incident may leave of a line whose rest is that of a potential energy.
 UNSTABLE = "after an incident the line at rest is unstable near"
-NO_REST_LEFT = "after an incident the line finds no rest"
+NO_REST_LEFT = "after an incident the line has no static equilibrium"
 
 # Of these, what counts as a step whose equations were not solved.
 UNSOLVED = ("do not agree", "does not converge", "correction diverges", "finds no solution")

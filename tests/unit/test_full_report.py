@@ -178,7 +178,7 @@ def test_a_rail_has_neither_droppers_nor_a_view_from_above(tmp_path: Path) -> No
     assert "Worst span by" in words and "Worst dropper by" not in words
     assert "droppers that slackened" not in words and "Evaluated droppers" not in words
     # Nothing is told of what the rail has not: effects that are off, rods of its arms, pre-sag.
-    effects = words.split("What was simulated")[-1].split("What was not simulated")[0]
+    effects = words.split("Simulated effects")[-1].split("Effects that were not simulated")[0]
     assert "contact_loss" in effects and "dropper" not in effects
     assert "clamp 7 kg" in words and "0 kg/m" not in words and "pre-sag wanted" not in words
     # The limit of the uplift, 500 times as much as the rail has, is named and not drawn.
@@ -370,7 +370,10 @@ def test_a_report_shows_measured_costs_of_effects(folder: Path, tmp_path: Path) 
     assert "catenary report --cost STUDY shows it here" in without
     invoke("report", str(tmp_path), "--cost", str(cost_study(tmp_path, "ac_simple", on=True)))
     words = words_of((tmp_path / "report.html").read_text())
-    assert "it costs 1.25 times; without it sigma changes by +10 %, most of all: keep it." in words
+    assert (
+        "it makes a step 1.25 times as long; without it sigma changes most, by +10 %: keep it."
+        in words
+    )
     assert f"costs and changes are those of {tmp_path}" in words
     assert "--cost STUDY" not in words
 

@@ -60,3 +60,17 @@ def test_a_picture_is_written_once_and_only_by_its_suffix(tmp_path: Path) -> Non
     assert again.exit_code == 2 and "exists already" in again.output
     other = invoke(*words, str(tmp_path / "line.pdf"))
     assert other.exit_code == 2 and "ends in .msh or .png or .svg" in other.output
+
+
+@pytest.mark.parametrize(
+    ("case", "arms"),
+    [("en50318_2002", ""), ("ac_simple", " arms sketched,"), ("ac_simple_3d", " arms at rest,")],
+)
+def test_the_title_of_the_cross_section_names_arms_only_where_they_are_drawn(
+    case: str, arms: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    seen: list[Figure] = []
+    monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: seen.append(self))
+    draw_scene(load_scene(case, shortened=True), tmp_path / "a.svg", force=False)
+    title = " ".join(seen[0].axes[2].get_title("left").split())
+    assert re.fullmatch(rf"cross-section at [0-9.]+ m,{arms} hollow: at [0-9.]+ m", title), title

@@ -132,8 +132,8 @@ def test_noise_that_was_stated_is_beside_what_remains(run: Path, table: pd.DataF
     assert not any("stated noise" in text for text in told[2.0])
     (text,) = (text for text in told[0.5] if "stated noise" in text)
     # The root of 2^2 - 0.5^2, of noise with 3 % of its own.
-    assert "the stated noise is 0.50 N" in text
-    assert float(text.split(": ")[2].split(" N")[0]) == pytest.approx(1.94, rel=0.1)
+    assert "the stated noise of 0.50 N: run" in text
+    assert float(text.split("differ by ")[1].split(" N")[0]) == pytest.approx(1.94, rel=0.1)
 
 
 def test_a_damaged_run_is_told_and_one_that_ends_before_the_stretch_refused(
@@ -145,7 +145,7 @@ def test_a_damaged_run_is_told_and_one_that_ends_before_the_stretch_refused(
     assert any("time is damaged from record" in one for one in found_in(tmp_path, table).remarks)
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         file["time"][300:] = np.nan
-    words = r"from 65 to 106\.\d+ m, and nothing of what is compared, 120 to 420 m"
+    words = r"from 65 to 106\.\d+ m, outside of the compared stretch, 120 to 420 m"
     with pytest.raises(InputError, match=words):
         found_in(tmp_path, table)
 
@@ -157,8 +157,8 @@ def test_noise_of_heights_is_beside_what_remains(run: Path, table: pd.DataFrame)
     remarks = found_in(run, table, measured={**PLACES, "head_height": column}).remarks
     (text,) = (text for text in remarks if "stated noise" in text)
     # The root of 4^2 - 1^2, of noise with 3 % of its own.
-    assert "the stated noise is 1.00 mm" in text
-    assert float(text.split(": ")[2].split(" mm")[0]) == pytest.approx(3.87, rel=0.1)
+    assert "the stated noise of 1.00 mm: run" in text
+    assert float(text.split("differ by ")[1].split(" mm")[0]) == pytest.approx(3.87, rel=0.1)
 
 
 def test_forces_of_another_world_are_not_aligned(run: Path, table: pd.DataFrame) -> None:
@@ -446,13 +446,17 @@ def test_three_runs_stand_side_by_side(run: Path, tmp_path: Path) -> None:
     assert head.split() == ["A", "B", "C", "B", "-", "A", "C", "-", "A"]
     (mean,) = (line.split() for line in lines if line.startswith("  mean [N]"))
     assert mean[2] == mean[3] and float(mean[5]) == 0.0
-    assert float(mean[6]) == pytest.approx(float(mean[4]) - float(mean[2]), abs=2e-4)
+    summaries = [json.loads((folder / "summary.json").read_text()) for folder in (tmp_path, run)]
+    faster, slower = (one["pantographs"][0]["mean_N"] for one in summaries)
+    # Rounded to half a unit of its last decimal.
+    last = 10.0 ** -len(mean[6].partition(".")[2])
+    assert float(mean[6]) == pytest.approx(faster - slower, abs=0.501 * last)
     by_spans = [line for line in lines if line.endswith(("within chance", "more than chance"))]
     assert len(by_spans) == 4
     assert all(re.search(r"- A +\S+ +\S+ to +\S+ (within|more than) chance", r) for r in by_spans)
     # The stretch is of whole spans, its last record included: both tables have one difference.
     *_, again = (line for line in by_spans if line.startswith("  pantograph mean"))
-    assert float(again.split("C - A")[1].split()[0]) == pytest.approx(float(mean[6]), abs=6e-4)
+    assert float(again.split("C - A")[1].split()[0]) == pytest.approx(faster - slower, abs=6e-4)
     assert by_spans[-1].startswith("  pantograph standard deviation C - A")
     assert sum("Largest difference" in line for line in lines) == 1
     assert any(line.startswith("C - A: The runs differ") for line in lines)
@@ -480,7 +484,7 @@ def test_stretches_that_differ_are_told(run: Path, tmp_path: Path) -> None:
     shutil.copy(run / "run.h5", tmp_path)
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         file["line/evaluation_range"][...] = [120.0, 405.0]
-    told = "evaluated are different stretches: A from 120 to 420 m, B from 120 to 405 m"
+    told = "the evaluated stretches differ: A from 120 to 420 m, B from 120 to 405 m"
     assert told in compare(run, tmp_path).splitlines()
     assert "different stretches" not in compare(run, run)
 
@@ -585,7 +589,7 @@ def test_several_columns_of_a_signal_are_refused_without_a_description(
         (
             "[measured]\nplace = { column = 'place_m' }\nforce = { column = 'force_N' }\n"
             "from_m = 1000.0\nto_m = 2000.0",
-            "and nothing of what is compared, 1000 to 2000 m",
+            "outside of the compared stretch, 1000 to 2000 m",
         ),
     ],
 )

@@ -172,15 +172,15 @@ def test_advice_weighs_cost_against_change() -> None:
     on, off = (Switch("e", "an effect", now, {"e": not now}, ("f",)) for now in (True, False))
     size = Size(200, (8, 8), (4, 4))
     for switch, ratio, after, words in (
-        (on, 0.5, figures(30.09), "costs 2.00 times; without it sigma changes by +0.3 %, most of "
-         "all: leave it out for figures within 1 %."),
-        (on, 0.5, figures(30.0, 206.0), "the maximum changes by +6 % of the mean, most of all: "
+        (on, 0.5, figures(30.09), "makes a step 2.00 times as long; without it sigma changes most, "
+         "by +0.3 %: leave it out for figures within 1 %."),
+        (on, 0.5, figures(30.0, 206.0), "the maximum changes most, by +6 % of the mean: "
          "keep it."),
-        (on, 1.0, figures(30.0), "costs nothing that can be measured; without it no figure "
+        (on, 1.0, figures(30.0), "has no measurable cost; without it no figure "
          "changes: keep it, or leave it out."),
-        (off, 2.0, figures(36.0), "with it sigma changes by +20 %, most of all: switch it on"),
+        (off, 2.0, figures(36.0), "with it sigma changes most, by +20 %: switch it on"),
         (off, 2.0, figures(30.0), "no figure changes: leave it out"),
-        (off, 0.8, figures(None), "makes steps cheaper, 0.80 times, and with it sigma comes or go"),
+        (off, 0.8, figures(None), "makes a step 0.80 times as long, and with it sigma comes or go"),
     ):  # fmt: skip
         row = Measured(switch, "done", size, ratio, after)
         assert words in output.advice(costs_of(row, figures(30.0)), row)

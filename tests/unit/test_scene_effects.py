@@ -44,7 +44,7 @@ def test_each_effect_can_be_left_out_with_those_that_require_it(name: str) -> No
     on, off = effect_rows(scene, problem_of(scene))
     assert name not in problem_of(scene).effects
     assert name not in [row.name for row in on]
-    assert [row.reason for row in off if row.name == name] == ["left out by the scene"]
+    assert [row.reason for row in off if row.name == name] == ["switched off by the scene"]
 
 
 @pytest.mark.parametrize("name", OPTIONAL)
@@ -140,7 +140,7 @@ def test_the_plan_tells_why_an_effect_is_not_simulated() -> None:
     scene = load_scene("en50318_2002", ["effects.arm_stiffness=false"])
     _, off = effect_rows(scene, problem_of(scene))
     reason = {row.name: row.reason for row in off}
-    assert reason["arm_stiffness"] == "left out by the scene"
+    assert reason["arm_stiffness"] == "switched off by the scene"
     assert reason["pre_sag"] == (
         "the scene has no data for it: line.dropper.pre_sag_mm or pre_sag_mid_mm other than 0"
     )
@@ -148,7 +148,7 @@ def test_the_plan_tells_why_an_effect_is_not_simulated() -> None:
     damped = ["contact.damping_N_s_per_m=10", "contact.law=linear"]
     scene = load_scene("ac_simple", [*damped, "effects.contact_damping=false"])
     _, off = effect_rows(scene, problem_of(scene))
-    assert {row.name: row.reason for row in off}["contact_damping"] == "left out by the scene"
+    assert {row.name: row.reason for row in off}["contact_damping"] == "switched off by the scene"
 
 
 def test_an_effect_that_needs_data_names_keys_that_scenes_have() -> None:
@@ -163,7 +163,7 @@ def test_an_effect_that_needs_data_names_keys_that_scenes_have() -> None:
 def test_an_effect_that_could_be_switched_on_needs_no_data(wind: Effect) -> None:
     scene = load_scene("ac_simple")
     _, off = effect_rows(scene, problem_of(scene))
-    assert {r.name: r.reason for r in off}[wind.name] == "off unless the scene asks for it"
+    assert {r.name: r.reason for r in off}[wind.name] == "off by default"
 
 
 def test_a_new_effect_becomes_a_key_without_a_change_here(wind: Effect) -> None:

@@ -383,6 +383,6 @@ def test_what_moves_the_train_along_the_track_is_doubted() -> None:
     found = sensitivity_of(load_scene(CASE, TINY), keys, MPI.COMM_SELF)
     text = as_text(found)
     # 1152 steps of 2 ms at 250 km/h: 0.22 km/h and 0.14 m.
-    assert "\ntrain.speed_km_h moves some of these already by 0.2 km/h: larger" in text
-    assert "\ntrain.start_m moves some of these already by 0.1 m: larger" in text
+    assert "\ntrain.speed_km_h already moves some of these by 0.2 km/h: for larger" in text
+    assert "\ntrain.start_m already moves some of these by 0.1 m: for larger" in text
     assert "moves some" not in as_text(tiny())

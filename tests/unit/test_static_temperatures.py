@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 from PIL import Image
 from scenes import load_scene
 from verb_runner import invoke
@@ -13,6 +14,7 @@ from verb_runner import invoke
 from catenary import InputError
 from catenary.cases.run.at_rest.static_table import check_line
 from catenary.cases.run.at_rest.temperatures import range_of, temperature_text
+from catenary.postproc.report.pictures.line_pictures import draw_temperatures
 from catenary.solver.model.wire_ends import WireEnd
 from catenary.solver.statics.tension_along import LineAtTemperature, WireAtRest
 
@@ -115,3 +117,17 @@ def test_a_check_tells_tensioners_at_their_stops() -> None:
     assert not any("stops" in text for text in free.warnings)
     (told,) = (text for text in stopped.warnings if "stops" in text)
     assert "At rest stops hold 2 of 2 tensioners, that of contact_wire at 720 m among them" in told
+
+
+def test_temperatures_are_told_apart_in_grey() -> None:
+    """Neighbours differ in their dashes, and the lines get lighter with the temperature."""
+    rests = [LineAtTemperature(warmer, (wire(0.01),)) for warmer in (-20.0, 0.0, 20.0, 40.0, 60.0)]
+    figure = draw_temperatures(rests)
+    curves = [line for line in figure.axes[0].get_lines() if line.get_label().endswith(" K")]
+    assert len(curves) == len(rests)
+    grey = [to_rgba(line.get_color())[:3] @ np.array([0.299, 0.587, 0.114]) for line in curves]
+    assert np.all(np.diff(grey) > 0.05) and grey[-1] < 0.75
+    styles = [line.get_linestyle() for line in curves]
+    assert all(one != other for one, other in zip(styles, styles[1:], strict=False))
+    start, end = figure.axes[-1].get_lines()[:2]
+    assert start.get_markersize() > end.get_markersize()

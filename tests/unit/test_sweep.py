@@ -113,7 +113,7 @@ def test_what_an_earlier_variant_left_damaged_is_told(
     with caplog.at_level("WARNING", "catenary.sweep"):
         assert read(file) is None
     (told,) = caplog.records
-    assert told.getMessage() == f"{file} is damaged: what it is of is done again"
+    assert told.getMessage() == f"{file} is damaged: its part of the study is repeated"
 
 
 def test_what_is_done_is_not_run_again(swept: tuple[Path, str]) -> None:

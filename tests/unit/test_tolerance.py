@@ -478,9 +478,9 @@ def test_an_installer_reads_which_criteria_nothing_helps_and_which_nothing_loses
     assert said[0] == "std_N <= 25: not kept without errors"  # before minutes of runs
     assert "speed, std_N <= 30: at least +-40 km/h" in said
     text = as_text(plan, found)
-    assert "no one up to there" in text and "by slopes" not in text
-    assert "What an installer may have for 1 of 2 criteria: others fail without errors\n" in text
-    assert "not kept without errors, so that no tolerance counts it: std_N <= 25\n" in text
+    assert "none up to there" in text and "by slopes" not in text
+    assert "Installation tolerances for 1 of 2 criteria: others fail without errors\n" in text
+    assert "not kept without errors, and left out of all tolerances: std_N <= 25\n" in text
     plan = make_plan(tiny(), task_of(SPEED, criteria=[lost], samples=samples))
     # Nothing is said of tolerances where there are none.
     assert as_text(plan, find_tolerances(plan)).count("REMARK") == 1

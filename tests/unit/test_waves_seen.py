@@ -72,7 +72,7 @@ def test_a_line_of_many_wires_has_a_line_of_speed_for_each() -> None:
     theory = WaveTheory(SPEED, 100.0, wires, 0.4, np.nan, np.nan, waves, "")
     assert len(theory.speeds()) == MOST_SPEEDS
     few = WaveTheory(SPEED, 100.0, wires[:3], 0.4, np.nan, np.nan, waves, "")
-    assert few.speeds()[-1] == (90.0, "fastest energy of the line (2.0 Hz)")
+    assert few.speeds()[-1] == (90.0, "greatest group velocity of the line (2.0 Hz)")
     axes = pictures.space_time(travelling(0.5, 7.5), few, np.array([60.0])).axes[0]
     # Each speed runs both ways from the train, beside its own course and a support.
     assert len(axes.get_lines()) == 1 + 2 * len(few.speeds()) + 1
@@ -138,7 +138,7 @@ def test_without_a_train_nothing_is_drawn_that_moves_with_it() -> None:
         {line.get_label() for line in pictures.wavenumbers(seen, theory).axes[0].get_lines()}
         for seen in (with_train, blow)
     ]
-    moving = "what moves with the train"
+    moving = "moving with the train"
     assert moving in drawn[0] and moving not in drawn[1]
 
 

@@ -151,9 +151,9 @@ def _at_stops(model: Model) -> list[str]:
     first = stopped[0]
     return [
         f"At rest stops hold {len(stopped)} of {counted(len(ends), 'tensioner')}, that of "
-        f"{first.wire} at {model.mesh.points[first.node, 0]:g} m among them: these wires have not "
-        f"the tension of their weights, see {option('`catenary static`', 'catenary.static')}. Take "
-        "a larger line.tensioner.travel_m, or a shorter section."
+        f"{first.wire} at {model.mesh.points[first.node, 0]:g} m among them: these wires do not "
+        f"have the tension of their weights, see {option('`catenary static`', 'catenary.static')}. "
+        "Take a larger line.tensioner.travel_m, or a shorter section."
     ]
 
 

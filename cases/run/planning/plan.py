@@ -76,14 +76,14 @@ def effect_rows(scene: Scene, problem: Problem) -> tuple[list[EffectRow], list[E
             if effect.always:
                 reason = "part of every scene"
             else:
-                reason = "asked for by the scene" if name in scene.effects else "default"
+                reason = "switched on by the scene" if name in scene.effects else "default"
             on.append(EffectRow(name, effect.title, reason))
         else:
             reason = effect.instead(problem) or _NO_DATA + effect.data
             if scene.effects.get(name) is False:
-                reason = "left out by the scene"
+                reason = "switched off by the scene"
             elif effect.applies(problem):
-                reason = "off unless the scene asks for it"
+                reason = "off by default"
             off.append(EffectRow(name, effect.title, reason))
     return on, off
 

@@ -150,7 +150,7 @@ class OverlapTable(Table):
     )
     along: Along = Field(
         "tensioner",
-        description="what wires end at inside the overlap; acts with effects.axial_motion",
+        description="what holds ends of wires inside the overlap; acts with effects.axial_motion",
     )
 
     @model_validator(mode="after")

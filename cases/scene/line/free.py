@@ -38,7 +38,7 @@ class FreeWireTable(WireTable):
 
     name: PartName = Field(description="its name: letters, digits, _, beginning with a letter")
     role: Literal["contact", "messenger", "auxiliary", "stitch"] = Field(
-        description="what it is there for; heads run on all contact wires"
+        description="its role; heads run on all contact wires"
     )
     stretches_m: list[Stretch] | None = Field(
         None,

@@ -41,16 +41,16 @@ class SteadyArmTable(Table):
         None,
         ge=0,
         le=30,
-        description="by how much it rises from the wire to its hinge at rest, with lateral motion; "
-        "if absent, what the weight that hangs at the arm makes of it",
+        description="inclination from the wire up to its hinge at rest, with lateral motion; if "
+        "absent, it follows from the weight that the arm carries",
     )
 
     registration_stiffness_N_per_m: float | None = Field(
         None,
         ge=1e3,
         le=1e8,
-        description="of the registration arm that holds its hinge, along the steady arm, with "
-        "lateral motion; if absent, it does not give",
+        description="stiffness along the steady arm of the registration arm that holds its hinge, "
+        "with lateral motion; rigid if absent",
     )
 
     uplift_stop_m: float | None = Field(
@@ -87,7 +87,7 @@ class FittingTable(Table):
     """A fitting as a lumped mass, which droppers are cut for."""
 
     kind: Literal["section_insulator", "neutral_section", "splice", "mid_point_anchor"] = Field(
-        description="what it is, for reports"
+        description="its kind, for reports"
     )
     wire: WireName = Field(
         "contact_wire",

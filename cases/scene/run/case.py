@@ -178,9 +178,9 @@ class OutputTable(Table):
         None,
         ge=0,
         le=1e4,
-        description="cadence of the line's channels; 0 records every step. Of this key and the "
-        "next four none: every step up to 500 MB, with window.mode = bounded of the spans that "
-        "move; beyond it every 5 ms from 300 m behind to 200 m ahead of the train",
+        description="cadence of the line's channels; 0 records every step. If this key and the "
+        "next four are absent: every step up to 500 MB, with window.mode = bounded of the spans "
+        "that move; beyond 500 MB every 5 ms from 300 m behind to 200 m ahead of the train",
     )
     line_channels_every_m: float | None = Field(
         None, ge=0, le=1e4, description="the same as a distance that the train travels"

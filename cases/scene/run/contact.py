@@ -61,7 +61,7 @@ class ContactTable(Table):
         0.1,
         ge=1e-3,
         le=10,
-        description="what stands for the speed of impact where contact is made more slowly",
+        description="least speed of impact that the law uses, where contact is made more slowly",
     )
 
     @model_validator(mode="after")

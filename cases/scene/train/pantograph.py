@@ -56,7 +56,7 @@ class _Pressing(Table):
         0.0,
         ge=0,
         le=2,
-        description="what the square of a wind across the track counts in that of the air's speed; "
+        description="factor of the squared wind across the track in the squared speed of the air; "
         "acts with aerodynamics or an aerodynamic_force",
     )
     laws: list[LawTable] = Field(
@@ -178,7 +178,7 @@ class MultibodyTable(_Pressing):
         description="arm above base at the static force; as assembled if absent",
     )
     assembly_tolerance_m: float = Field(
-        0.05, gt=0, le=1, description="by how much a joint may miss in the given positions"
+        0.05, gt=0, le=1, description="largest closure error of a joint in the given positions"
     )
     gravity: bool = Field(True, description="whether the bodies weigh something")
     motion: Literal["reduced", "all_bodies"] = Field(

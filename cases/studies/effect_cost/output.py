@@ -91,8 +91,8 @@ def advice(found: Costs, row: Measured) -> str:
 
 def _price(cost: float) -> str:
     if abs(cost - 1.0) <= _SAME_COST:
-        return "costs nothing that can be measured"
-    return f"costs {cost:.2f} times" if cost > 1.0 else f"makes steps cheaper, {cost:.2f} times"
+        return "has no measurable cost"
+    return f"makes a step {cost:.2f} times as long"
 
 
 def _words(found: Costs, change: Change, on: bool) -> str:
@@ -105,7 +105,7 @@ def _words(found: Costs, change: Change, on: bool) -> str:
     of = " of the mean" if change.figure in ("max_N", "min_N") else ""
     percent = 100 * change.share
     number = f"{percent:+.0f}" if abs(percent) >= 10 else f"{percent:+.2g}"
-    return f"{what} changes by {number} %{of}, most of all"
+    return f"{what} changes most, by {number} %{of}"
 
 
 def width_text(size: Size) -> str:
@@ -125,9 +125,8 @@ def as_text(found: Costs) -> str:
     lines = [
         f"{found.case}: evaluated from {start:g} to {end:g} m; {counted(rounds, 'repetition')} of "
         f"{counted(found.n_steps, 'step')} in turns.",
-        "Forces in N, uplift in mm; of an effect that is switched, what changes. cost: how many "
-        "times as long",
-        "a step takes with the effect as without, the median of the repetitions.",
+        "Forces in N, uplift in mm; the row of an effect shows the changes when it is switched.",
+        "cost: time of a step with the effect over that without, the median of the repetitions.",
     ]
     if len(found.names) > 1:
         lines.append(f"Forces are those of {found.names[0]}, which leads.")

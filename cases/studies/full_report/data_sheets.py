@@ -213,8 +213,9 @@ def pantographs(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     for file, (name, (placement, _)) in zip(PICTURES["pantographs"], kinds.items(), strict=False):
         how = "drawn to scale from its joints"
         if isinstance(placement.data, LumpedData):
+            length = "assumed" if placement.data.strips.length is None else "to scale"
             how = "sketched from the side and from the front: "
-            how += "a head of its length, springs and arms"
+            how += f"springs and arms are schematic, the strips' length is {length}"
         text = f"Pantograph {_plain(name)}, {how}."
         pictures.append(Picture(file, text, partial(_drawn, placement.data)))
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)

@@ -72,11 +72,14 @@ def _pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
     if places.passages:
         passage = places.passages[0]
         who = results.pantograph_names()[passage.pantograph]
-        text = f"Contact force of {in_sentence(who)} in the worst span and its neighbours."
+        text = (
+            f"Contact force of {in_sentence(who)} in the worst span and the two beside it, and "
+            "height of the contact wire above the rail."
+        )
         yield Picture("worst_span", text, lambda: _span(results, passage))
     for name, spots, what in (
-        ("worst_dropper", places.forces, "Force of the most loaded dropper"),
-        ("longest_slack", places.slack, "Force of the dropper with longest slack"),
+        ("worst_dropper", places.forces, "Force of the dropper with the largest force"),
+        ("longest_slack", places.slack, "Force of the dropper that is slack the longest"),
     ):
         for spot in spots[:1]:
             caption = f"{what}, {spot.place}, as the train passes."

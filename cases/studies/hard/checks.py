@@ -221,8 +221,8 @@ class _OneCase:
         gain, allowed = base.energy_gain(), self.case.energy_gain
         one_switch = min(halved.one_switch / halved.energy_scale(), allowed)
         limit = max(FALLS * gain, one_switch, ROUND_OFF)
-        yield self._below("energy from nothing", gain, allowed)
-        yield self._below("the same at half the step", halved.energy_gain(), limit)
+        yield self._below("energy made by the integration", gain, allowed)
+        yield self._below("energy made at half the step", halved.energy_gain(), limit)
 
     def _correction(self, base: RunHistories, other: RunHistories) -> Criterion:
         """The paper's correction agrees, or breaks where the table says so."""
@@ -361,8 +361,8 @@ Remarks = Mapping[str, Mapping[str, Sequence[str]]]
 _COLUMNS = {
     "largest contact force [N]": ("force [N]", ".0f"),
     "largest lift [m]": ("lift [m]", ".2g"),
-    "energy from nothing": ("energy made", ".2g"),
-    "the same at half the step": ("at half the step", ".2g"),
+    "energy made by the integration": ("energy made", ".2g"),
+    "energy made at half the step": ("at half the step", ".2g"),
     "difference after halving the step twice to once": ("refinement", ".2g"),
     "fixed-point correction, head height [m]": ("schemes [m]", ".2g"),
 }
@@ -391,7 +391,7 @@ def page(cases: Sequence[HardCase], found: Sequence[Criterion], remarks_of: Rema
     ``remarks_of`` each case."""
     columns = [
         Column("case", "case"),
-        Column("words", "what is hard; *a right answer*"),
+        Column("words", "difficulty; *expected result*"),
         *(Column(name, *shown) for name, shown in _COLUMNS.items()),
         *(Column(name, name) for name in ("others", "remarks", "kept")),
     ]

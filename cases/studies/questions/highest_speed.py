@@ -124,8 +124,8 @@ def find_speeds(
     Raises
     ------
     InputError
-        If the range is none, if no speed can be run, if no criterion has a wanted name, or if the
-        scene cannot be turned for the one ``direction``.
+        If the range is invalid, if no speed can be run, if no criterion has a wanted name, or if
+        the scene cannot be turned for the one ``direction``.
     Interrupted
         If a signal came.
     """

@@ -114,7 +114,7 @@ def find_separations(marching: Marching, distances: Distances) -> SeparationStud
     Raises
     ------
     InputError
-        If the range is none, or if nothing can be run.
+        If the range is invalid, or if nothing can be run.
     Interrupted
         If a signal came.
     """

@@ -105,9 +105,9 @@ def _kinks(found: Sensitivity) -> str:
     contacts, links = found.contact_switches, found.link_switches
     return (
         f"In {found.n_steps} steps contacts opened or closed {contacts} times and droppers or "
-        f"other links switched {links} times. Derivatives hold while a change moves none of these "
-        "to another step, and those of least and largest values while these stay at their step and "
-        "arm; larger changes also add what the moved switches do."
+        f"other links switched {links} times. Derivatives hold for changes that leave all of these "
+        "in their steps; those of least and largest values also require that these stay at their "
+        "step and arm. Larger changes add the effect of the switches that move."
     )
 
 
@@ -123,8 +123,8 @@ def _early(found: Sensitivity) -> list[str]:
         else:
             continue
         sentences.append(
-            f"{one.key} moves some of these already by {least:.1g} {one.unit}: larger changes may "
-            "do something else than its derivative says, and even of the other sign. Run variants "
-            "of it (`catenary sweep`)."
+            f"{one.key} already moves some of these by {least:.1g} {one.unit}: for larger "
+            "changes its derivative may be wrong in size and even in sign. Run variants of it "
+            "(`catenary sweep`)."
         )
     return sentences

@@ -130,9 +130,8 @@ def run_jobs(
             ahead = spent / n_run * (len(left) - n_run)
             place = f"{places[number]}:" if several else "   "
             bar.ended()
-            bar.say(
-                f"{place} {_figures(one)}; {duration(spent)} gone, about {duration(ahead)} left"
-            )
+            remaining = f", about {duration(ahead)} left" if n_run < len(left) else ""
+            bar.say(f"{place} {_figures(one)}; {duration(spent)} gone{remaining}")
     came = {number: one for number, one in sorted(ended.items()) if one.outcome != INTERRUPTED}
     missing = [job for number, job in enumerate(jobs) if number not in came]
     return [*came.values(), *(Ended(job.variant, INTERRUPTED) for job in missing[:1])]

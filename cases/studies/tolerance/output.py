@@ -104,7 +104,7 @@ def installer_table(plan: Plan, found: Sequence[Tolerance]) -> StudyTable:
     absent = {"worst"} if not plan.task.samples.worst_case else set()
     absent |= {"together"} if together is None else set()
     columns = [column for column in columns if column.name not in absent]
-    title, lost = "What an installer may have", _lost(found)
+    title, lost = "Installation tolerances", _lost(found)
     if lost:
         n = len({one.criterion for one in found if one.criterion != EACH})
         title += f" for {n - len(lost)} of {n} criteria: others fail without errors"
@@ -126,7 +126,7 @@ def _first_to_fail(found: Sequence[Tolerance]) -> str:
     """The criterion with the least tolerance of those that the line keeps without errors."""
     kept = [one for one in found if one.criterion != EACH and one.is_kept]
     first = min(kept, key=lambda one: (one.level, one.at_most))
-    return "no one up to there" if first.at_most else first.criterion
+    return "none up to there" if first.at_most else first.criterion
 
 
 def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
@@ -134,7 +134,7 @@ def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
     sentences = []
     if lost := _lost(found):
         sentences.append(
-            f"not kept without errors, so that no tolerance counts it: {', '.join(lost)}"
+            f"not kept without errors, and left out of all tolerances: {', '.join(lost)}"
         )
     if all(not one.is_kept for one in found):
         return sentences
@@ -142,20 +142,20 @@ def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
     fail = f"at most {samples.allowed} of them fail" if samples.allowed else "none of them fails"
     sentences.append(
         f"at least {100 * samples.probability:g} % of all lines keep the criteria within their "
-        f"tolerance, with {100 * samples.confidence:g} % confidence: so show {samples.n} samples "
+        f"tolerance, with {100 * samples.confidence:g} % confidence: {samples.n} samples show this "
         f"if {fail}; tolerances are found to {100 * samples.resolution:g} % of the greatest that "
-        "was looked at"
+        "was tried"
     )
     if samples.worst_case:
         sentences.append(
-            "`by slopes` is linear in the errors, `as run` the line with just these errors: where "
-            "both differ much, slopes do not hold so far, and other lines are worse"
+            "`by slopes` is linear in the errors, `as run` is a run of the line with these errors: "
+            "where both differ much, the linear estimate fails, and other lines may be worse"
         )
     if any(one.lost_at is not None for one in found):
         sentences.append(
-            "`a line fails at` is the least tolerance within which a line that was run fails, a "
-            "sample or the worst case by slopes: where it is not above the tolerance, that line is "
-            "one of the few that may fail, and a tolerance that all lines keep is smaller"
+            "`a line fails at` is the smallest tolerance at which a run fails, of a sample or of "
+            "the worst case by slopes. If it is not above the tolerance, that line is one of the "
+            "few that may fail: a tolerance that all lines keep is smaller"
         )
     return sentences
 

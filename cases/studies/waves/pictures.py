@@ -78,7 +78,7 @@ def train_frame(
     relative, velocity = seen.in_the_train(behind, ahead)
     _velocity(figure, axes, relative, seen.time, velocity)
     when = seen.time[0] + 0.3 * np.ptp(seen.time)
-    label = "waves of the contact wire that run ahead, and back"
+    label = "wave speed of the contact wire, forward and backward"
     # What runs ahead more slowly than the train falls behind it, too.
     for speed in (theory.wave_speed - theory.speed, -theory.wave_speed - theory.speed):
         end = ahead if speed > 0.0 else -behind
@@ -121,7 +121,7 @@ def wavenumbers(seen: WavesSeen, theory: WaveTheory, what: str = "train") -> Fig
     if seen.position.shape[1]:
         axes.plot(
             ends, theory.speed * ends / (2 * np.pi), color=figures.LIMIT, linewidth=1.0,
-            label=f"what moves with the {what}",
+            label=f"moving with the {what}",
         )  # fmt: skip
     for sign in (1.0, -1.0):
         axes.plot(
@@ -167,7 +167,9 @@ def energy_parts(energy: EnergySeen, seen: WavesSeen, what: str) -> Figure:
     places = places_of(seen, energy.time)
     behind, between, ahead = energy.parts(places)
     labels = (
-        ("behind", "between", "ahead") if seen.position.shape[1] else ("before it", "", "beyond it")
+        ("behind", "between", "ahead")
+        if seen.position.shape[1]
+        else ("before the blow", "", "beyond the blow")
     )
     # Both halves are alike on both sides of a blow: the one drawn last lets the other be seen.
     looks = ((0, 2.4), (2, 1.2), (1, 1.0))
@@ -177,7 +179,7 @@ def energy_parts(energy: EnergySeen, seen: WavesSeen, what: str) -> Figure:
             over_time.plot(
                 energy.time, part, color=figures.COLOURS[number], linewidth=width, label=label
             )
-    over_time.plot(energy.time, energy.total, color="black", linewidth=0.9, label="all")
+    over_time.plot(energy.time, energy.total, color="black", linewidth=0.9, label="whole line")
     over_time.set_ylim(bottom=0.0)
     figures.tidy(over_time, "time [s]", "energy of the line [J]")
     figures.legend_above(over_time)

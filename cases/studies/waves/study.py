@@ -246,11 +246,9 @@ def as_rows(theory: WaveTheory) -> list[Row]:
     """Figures with unit and meaning; those that the line does not have are left out."""
     of_string = "" if theory.by_bending else ", sqrt(T / m)"
     doppler = "Doppler factor of an echo from ahead, (c - v) / (c + v)"
-    sent_back = (
-        "share of a wave on the contact wire that a stiff dropper sends back, Z_m / (Z_c + Z_m)"
-    )
+    sent_back = "reflection coefficient of a stiff dropper on the contact wire, Z_m / (Z_c + Z_m)"
     grows = (
-        "growth of a wave between head and dropper with each return, that share / Doppler factor"
+        "amplification of a wave between head and dropper, reflection coefficient / Doppler factor"
     )
     rows = [
         ("train_speed", theory.speed, "m/s", "speed of the train"),
@@ -297,7 +295,10 @@ def as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str]) -> 
         f"{row['meaning']}: {row['value']:.4g} {units.get(row['unit'], row['unit'])}".rstrip()
         for row in rows
     ]
-    for what, bands in (("Pass bands", theory.bands()), ("Outrun the train", theory.outrunning())):
+    for what, bands in (
+        ("Pass bands", theory.bands()),
+        ("Faster than the train", theory.outrunning()),
+    ):
         text = ", ".join(f"{low:.2f}-{high:.2f}" for low, high in bands)
         if text:
             lines.append(f"{what}: {text} Hz")

@@ -40,7 +40,7 @@ class WaveTheory:
     wires : name and slowest wave of all wires, sqrt(T / m) of strings [m/s]
     doppler : (c - v) / (c + v) [-]: an echo from ahead comes back with its frequency over this; NaN
         for a train that no wave of the wire outruns
-    reflection : share of a wave on the contact wire that a stiff dropper sends back,
+    reflection : reflection coefficient of a stiff dropper on the contact wire,
         Z_m / (Z_c + Z_m) with impedances sqrt(T m); NaN for lines of more than two wires [-]
     amplification : reflection / doppler, by which an echo grows with each return [-]
     bloch : waves of the line as a periodic one, None if its spans are not alike
@@ -72,7 +72,7 @@ class WaveTheory:
         found = list(wires.values())
         if self.bloch is not None:
             speed, at = self.bloch.fastest(HIGHEST)
-            found.append((speed, f"fastest energy of the line ({at:.1f} Hz)"))
+            found.append((speed, f"greatest group velocity of the line ({at:.1f} Hz)"))
         return found[:MOST_SPEEDS]
 
     def bands(self) -> np.ndarray:
@@ -163,10 +163,10 @@ def reflection_rows(found: list[EndReflection], speed: float) -> list[dict[str, 
     """Figures of waves that outrun a train [m/s], none where no wave does."""
     rows = []
     for side, end in zip(SIDES, found, strict=False):
-        of_what = f"the {side} of the line sends back of waves that outrun the train"
+        of_what = f"reflected by the {side} of the line, of waves faster than the train"
         amplitude, energy = end.of_faster(speed), end.energy_of_faster(speed)
         rows += [
-            row_of(f"{name}_{side}", value, "-", f"{what} that {of_what}")
+            row_of(f"{name}_{side}", value, "-", f"{what} {of_what}")
             for name, value, what in (
                 ("largest_reflection", amplitude[0], "largest amplitude"),
                 ("rms_reflection", amplitude[1], "root mean square amplitude"),
@@ -211,7 +211,7 @@ def draw_reflections(
         )  # fmt: skip
         axes.scatter(
             frequency[fast], shown[fast], s=size, marker=marker, color=colour, linewidths=0,
-            label=f"{name}: waves that outrun the train",
+            label=f"{name}: waves faster than the train",
         )  # fmt: skip
     axes.scatter(
         [], [], s=8.0, facecolors="none", edgecolors=figures.GREY, linewidths=0.5,
@@ -219,13 +219,13 @@ def draw_reflections(
     )  # fmt: skip
     axes.axhline(_LITTLE**0.5, color=figures.GREY, linewidth=0.8, linestyle="--", zorder=0)
     axes.annotate(
-        f"{100.0 * _LITTLE:g} % of the energy", (HIGHEST, _LITTLE**0.5), (-3.0, 2.0),
+        f"{100.0 * _LITTLE:g} % of the energy reflected", (HIGHEST, _LITTLE**0.5), (-3.0, 2.0),
         textcoords="offset points", ha="right", va="bottom", fontsize="small", color=figures.GREY,
     )  # fmt: skip
     axes.set_yscale("log")
     axes.set_xlim(0.0, HIGHEST)
     axes.set_ylim(0.7 * _LEAST, 2.0)
-    figures.tidy(axes, "frequency [Hz]", f"amplitude sent back [-] (least drawn: {_LEAST:g})")
+    figures.tidy(axes, "frequency [Hz]", f"reflected amplitude [-], drawn from {_LEAST:g}")
     figures.legend_above(axes, 2)
     return figure
 

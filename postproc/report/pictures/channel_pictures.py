@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -31,6 +31,9 @@ from catenary.solver.time_loop.views.channels import (
     WIRE_END,
     Channel,
 )
+
+# A channel in metres that stays below this is drawn in millimetres [m].
+_SMALL = 0.1
 
 
 def channel_pictures(results: Results) -> list[tuple[str, str, Callable[[], Figure | None]]]:
@@ -77,7 +80,17 @@ def _of_train(results: Results, channel: Channel) -> Figure:
     elif channel.per == CONTACT:
         for p, by_name in enumerate(results.contact_columns()):
             shown[p] = [(name or word, column) for name, column in by_name.items()]
-    return panels_along_track(results, channel.name, shown, _label(channel))[0]
+    label, factor = _label(channel), 1.0
+    columns = [column for curves in shown.values() for _, column in curves]
+    if channel.unit == "m" and _largest(results, channel.name, columns) < _SMALL:
+        label, factor = label.replace("[m]", "[mm]"), 1e3
+    return panels_along_track(results, channel.name, shown, label, factor=factor)[0]
+
+
+def _largest(results: Results, name: str, columns: Sequence[int]) -> float:
+    """Largest magnitude in columns of a channel; not those without a number."""
+    values = (np.abs(results.column(name, column)) for column in columns)
+    return max((float(np.nanmax(own, initial=0.0)) for own in values), default=0.0)
 
 
 @own_style()

@@ -177,6 +177,7 @@ def _cross_section(
         for wire in line.wires_of(Role.CONTACT)
         if mesh.x(mesh.wires[wire.name])[0] <= at <= mesh.x(mesh.wires[wire.name])[-1]
     )
+    arms = ""
     for group in line.steady_arms:
         for node in mesh.steady_arms[np.abs(mesh.x(mesh.steady_arms) - at) < 1e-6]:
             if node in mesh.wires[group.wire] and group.kind.length > 0.0:
@@ -186,6 +187,7 @@ def _cross_section(
                     number = int(np.flatnonzero(mesh.steady_arms == node)[0])
                     across, up, _ = length * form.lateral.arm_direction[number]
                 axes.plot([y, y + across], [z, z + up], color=GREY, lw=1.2)
+                arms = f"\narms {'sketched' if form.lateral is None else 'at rest'},"
     if half_head is not None:
         axes.plot([-half_head, half_head], [lowest, lowest], color="black", lw=2.0)
     axes.axvline(0.0, color=GREY, lw=0.5, ls="--")
@@ -197,8 +199,7 @@ def _cross_section(
         getattr(axes, f"set_{axis}lim")(low - spare, high + spare)
     axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.set_xlabel("to the left [m]")
-    arms = "sketched" if form.lateral is None else "at rest"
-    title = f"cross-section at {at:g} m,\narms {arms};\nhollow: at {between:g} m"
+    title = f"cross-section at {at:g} m,{arms}\nhollow: at {between:g} m"
     axes.set_title(title, loc="left", fontsize=10)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -19,6 +19,8 @@ from catenary.postproc.report.pictures.figures import (
     GREY,
     LIGHT,
     LIMIT,
+    LINES,
+    MARKS,
     colour,
     legend_above,
     new_figure,
@@ -234,7 +236,7 @@ def _draw_elasticity(axes: Axes, results: Results) -> None:
     tidy(
         axes,
         "position along the track [m]",
-        "lift under unit force [mm/N]",
+        "elasticity [mm/N]",
         f"Elasticity along span {results.span_at_rest + 1}",
     )
     legend_above(axes)
@@ -303,30 +305,35 @@ def draw_temperatures(rests: Sequence[LineAtTemperature]) -> Figure:
     names = [wire.name for wire in found[0].wires if wire.ends] if found else []
     figure = new_figure(2.6 * (len(names) + 1))
     panels = figure.subplots(len(names) + 1, 1, squeeze=False)[:, 0]
-    warmth = matplotlib.colormaps["coolwarm"]
+    # From dark to light without the lightest yellow: neighbours differ in grey by their dashes too.
+    warmth = matplotlib.colormaps["viridis"]
     range_ = [rest.warmer for rest in found]
     low, high = min(range_, default=0.0), max(range_, default=1.0)
     for axes, name in zip(panels, names, strict=False):
-        for rest in found:
+        for number, rest in enumerate(found):
             wire = next(own for own in rest.wires if own.name == name)
             share = (rest.warmer - low) / max(high - low, 1e-12)
             label = f"{rest.warmer:+g} K" if rest.warmer else "0 K"
-            axes.plot(wire.x, 100 * wire.change, color=warmth(share), lw=1.3, label=label)
+            shade, dashes = warmth(0.85 * share), LINES[number % len(LINES)]
+            axes.plot(wire.x, 100 * wire.change, color=shade, ls=dashes, lw=1.3, label=label)
         worst = max((np.abs(axes.get_ylim()).max(), 1.0))
         if worst > 0.7 * _ALLOWED:
             for side in (-_ALLOWED, _ALLOWED):
                 axes.axhline(side, color=LIMIT, lw=0.9, ls="--")
-        tidy(axes, "position along the track [m]", "change of tension [%]", name)
+        tidy(axes, "position along the track [m]", "change of tension [%]", wire_words(name))
         if name == names[0]:
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
     ends = panels[-1]
-    for tone, name in zip(COLOURS, names, strict=False):
+    for number, (tone, name) in enumerate(zip(COLOURS, names, strict=False)):
         wires = [own for rest in found for own in rest.wires if own.name == name]
         for i, end in enumerate(wires[0].ends):
             moved = [1e3 * own.moved[i] for own in wires]
-            style = "-" if end.outwards > 0 else "--"
-            label = f"{name}, {'end' if end.outwards > 0 else 'start'}"
-            ends.plot(range_, moved, style, color=tone, marker="o", ms=3, lw=1.3, label=label)
+            # Both ends of a symmetric line move alike: the start is a larger hollow mark.
+            at_end = end.outwards > 0
+            how: dict[str, Any] = {"color": tone, "marker": MARKS[number % len(MARKS)], "lw": 1.3}
+            how |= {"ms": 3} if at_end else {"ms": 8, "mfc": "none", "ls": "--"}
+            label = f"{wire_words(name)}, {'end' if at_end else 'start'}"
+            ends.plot(range_, moved, label=label, **how)
     ends.axhline(0.0, color=GREY, lw=0.6)
     tidy(ends, "temperature above the installation [K]", "end outwards [mm]", "ends of the wires")
     if names:

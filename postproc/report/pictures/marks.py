@@ -42,6 +42,7 @@ def panels_along_track(
     *,
     low_pass: bool = False,
     dashed: bool = False,
+    factor: float = 1.0,
 ) -> tuple[Figure, list[Axes]]:
     """A panel for each pantograph with curves of a channel over the pantograph's position.
 
@@ -59,6 +60,8 @@ def panels_along_track(
         Take the part below 20 Hz, unless the record is sampled too slowly.
     dashed : bool, optional
         Dash the second of two curves, which may lie on each other.
+    factor : float, optional
+        Unit of the channel over that of ``label``.
     """
     start, end = travelled(results)
     figure, panels = stacked(0.7 + 2.3 * len(shown), len(shown), shared=True)
@@ -70,7 +73,7 @@ def panels_along_track(
                 with contextlib.suppress(InputError):  # the report says so
                     values = filters.low_pass(values, results.dt)
             chosen = thinned(values)
-            values = values[chosen]
+            values = factor * values[chosen]
             axes.plot(
                 results.column("contact_position", p)[chosen],
                 values,

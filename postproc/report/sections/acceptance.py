@@ -137,9 +137,11 @@ def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
     if shares:
         one, label = min(shares, key=lambda pair: abs(_distance(pair[0]) / pair[0].limit))
         share = 100.0 * _distance(one) / abs(one.limit)
-        which = "" if all(other.passed for other, _ in judged) else ", of those that passed"
+        head = "Nearest to its limit"
+        if not all(other.passed for other, _ in judged):
+            head = "Passed criterion nearest to its limit"
         yield (
-            f"Nearest to its limit{which}: {label}, with a margin of {_margin(one)} {one.unit} "
+            f"{head}: {label}, with a margin of {_margin(one)} {one.unit} "
             f"({number(share, decimals_that_tell(share, 0.0, 1))} %)."
         )
     without_share: dict[str, str] = {}
@@ -148,18 +150,18 @@ def nearest_limit(run: EvaluatedRun) -> Iterator[str]:
             without_share.setdefault(one.quantity, f"{label} ({_margin(one)} {one.unit})")
     if without_share:
         named = ", ".join(without_share.values())
-        yield f"Margins from limits of zero, which have no shares: {named}."
+        yield f"Margins from limits of zero, without a percentage: {named}."
     errors, what = errors_of(run), _SOURCES[bool(run.measured)]
     turned = _turned(judged, errors)
     if turned:
-        yield f"The {what} could turn the verdict on: {turned}."
+        yield f"The {what} could change the verdict on: {turned}."
     elif any(np.isfinite(_error_of(one, errors)) for one, _ in judged):
-        yield f"The {what} turns no verdict: where it is known, it is smaller than the margin."
+        yield f"The {what} changes no verdict: where it is known, it is smaller than the margin."
     left = _turned(judged, _start_up(run))
     if left:
         yield (
-            f"What the start of the run leaves in the evaluated stretch could turn the verdict on: "
-            f"{left}. A longer run-in leaves less."
+            "Start-up, which still affects the evaluated stretch, could change the verdict on: "
+            f"{left}. Take a longer run-in."
         )
 
 

@@ -37,7 +37,10 @@ def _blocks(run: EvaluatedRun) -> Iterator[StudyTable]:
     label = "estimated error of the force history by the time step, 20 Hz, rms"
     rows.append([label, "N", *(number(float(error), 2) for error in found.force_error)])
     shares = (number(100.0 * share, 2) for share in found.relative_error)
-    rows += [["the same, of the standard deviation", "%", *shares], *_violations(run.results)]
+    rows += [
+        ["this error relative to the standard deviation", "%", *shares],
+        *_violations(run.results),
+    ]
     heads = ["in the evaluation stretch", "unit", *(p.name for p in pantographs)]
     yield texts_table(heads, rows, set(range(2, len(heads))))
 
@@ -57,7 +60,7 @@ def _pictures(run: EvaluatedRun) -> Iterator[Picture]:
     results, statistics = run.results, run.statistics
     if results.n_rows("time") < 2:
         return
-    text = "Contact force along the track."
+    text = "Contact force along the track, unfiltered and below 20 Hz."
     yield Picture("contact_force", text, lambda: forces.contact_force(results))
     if results.several_strips:
         text = "Shares of the collector strips in the contact force, below 20 Hz."
@@ -70,8 +73,8 @@ def _pictures(run: EvaluatedRun) -> Iterator[Picture]:
         yield Picture("lateral_place", text, lambda: lateral_places(results))
     known = len(statistics.pantographs) - len(statistics.complaints)
     if known > 1:  # of one the table says it all
-        text = "Contact force in the evaluation stretch."
+        text = "Statistics of the contact force in the evaluation stretch, below 20 Hz."
         yield Picture("statistics", text, lambda: forces.force_statistics(statistics))
     if known:
-        text = "Distribution of the contact force in the evaluation stretch."
+        text = "Histogram of the contact force in the evaluation stretch, below 20 Hz."
         yield Picture("histogram", text, lambda: forces.force_histogram(statistics))

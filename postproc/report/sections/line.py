@@ -46,13 +46,16 @@ def _of_motion(run: EvaluatedRun) -> Iterator[Picture]:
     results, statistics = run.results, run.statistics
     if results.n_rows("time") > 1 and statistics.supports.x.size:
         limit = 1e-3 * run.limit("arm_uplift")
-        text = "Uplift of the contact wire at the steady arms."
+        text = (
+            "Uplift of the contact wire at the steady arms: histories, and the largest of each arm."
+        )
         yield Picture("uplift", text, lambda: line_pictures.arm_uplift(results, statistics, limit))
     if results.n_rows("time") > 1 and statistics.droppers.x.size:
-        text = "Dropper forces."
+        text = "Dropper forces: histories of two droppers, and the range of each dropper."
         yield Picture("droppers", text, lambda: line_pictures.dropper_force(results, statistics))
     if any(times.size for times in results.energies().values()):
-        yield Picture("energy", "Energies of the line.", lambda: line_pictures.energies(results))
+        text = "Kinetic and elastic energy of the whole line."
+        yield Picture("energy", text, lambda: line_pictures.energies(results))
     yield from (Picture(*drawn) for drawn in channel_pictures(results))
 
 
@@ -61,7 +64,7 @@ def at_rest(run: EvaluatedRun) -> Section:
     from catenary.postproc.report.pictures import line_pictures
 
     results = run.results
-    text = "Profile and elasticity of the line."
+    text = "Height of the contact wire at rest, and its elasticity."
     picture = Picture("static", text, lambda: line_pictures.static_line(results))
     return Section("Line at rest", _of_rest(results), [picture], _all_droppers(results))
 

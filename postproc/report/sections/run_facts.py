@@ -80,7 +80,7 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
         them.
     """
     about, (cost_of, study) = run.results.attributes, costs
-    heads = ["effect", "what it is", "why", *(["what it costs and changes"] if cost_of else [])]
+    heads = ["effect", "model", "reason", *(["cost and change"] if cost_of else [])]
     on, off = (
         texts_table(
             heads,
@@ -91,7 +91,7 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
         )
         for rows in (about["effects_on"], about["effects_off"])
     )
-    left = Folded(f"What was not simulated: {counted(len(off.rows), 'effect')}", off)
+    left = Folded(f"Effects that were not simulated: {len(off.rows)}", off)
     how = (
         "Costs are how many times as long a step takes with the effect as without; costs and "
         f"changes are those of {study}."
@@ -99,7 +99,7 @@ def effects(run: EvaluatedRun, costs: tuple[Mapping[str, str], str] = ({}, "")) 
         else f"`catenary plan {quote(about['case'])} --cost -o STUDY` measures what each costs and "
         "changes; `catenary report --cost STUDY` shows it here."
     )
-    return Section("What was simulated", [on, Text(how)], folded=[left])
+    return Section("Simulated effects", [on, Text(how)], folded=[left])
 
 
 def signatures(text: str | None, run: EvaluatedRun) -> Section:

@@ -97,9 +97,9 @@ class ColumnPieces:
             at, data = self._responses.solve(places, like, columns.reach, FELT_AT_MOST)
         except FeltFurther as error:
             raise RunBroken(
-                f"near {places.x.mean():.0f} m the line answers further from a force than the "
-                f"{columns.reach:.0f} m of where it was tried, which a window cannot follow; set "
-                "window.mode to off"
+                f"near {places.x.mean():.0f} m a force moves the line beyond the "
+                f"{columns.reach:.0f} m that it reaches at the start, which a window cannot "
+                "follow; set window.mode to off"
             ) from error
         columns.at[which] = first + at
         columns.data[first : first + data.size] = data

@@ -36,7 +36,7 @@ from catenary.solver.model.model import Model
 
 # Message where stations are joined otherwise than the layout has it.
 JOINED_OTHERWISE = (
-    "stations of the line are joined otherwise than those at its start, which a window cannot "
+    "nodes of the line are coupled in another way than those at its start, which a window cannot "
     "follow; set window.mode to off"
 )
 

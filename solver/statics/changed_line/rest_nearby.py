@@ -219,8 +219,8 @@ class RestNearby:
                 break
             if again > _ALL_AT_ONCE + 2 * n + 2 * len(self._ends):
                 raise InputError(
-                    f"the line finds no rest{where(model)}: its droppers or tensioners start and "
-                    "stop without end"
+                    f"the line has no static equilibrium{where(model)}: its droppers or "
+                    "tensioners keep switching"
                 )
             chosen = wrong if again < _ALL_AT_ONCE else np.arange(n) == np.argmax(wrong)
             slack = slack ^ (chosen & wrong)
@@ -280,16 +280,16 @@ class RestNearby:
             change = float(np.abs(step).max())
             if not change < _FARTHEST:
                 raise InputError(
-                    f"the line finds no rest{where(model)}: Newton's method leaves all bounds; its "
-                    "wires may be slack there"
+                    f"the line has no static equilibrium{where(model)}: Newton's method "
+                    "diverges; its wires may be slack there"
                 )
             moved += step
             form = potential.form(moved)
             if change < _SETTLED or not (self._bends or model.droppers_bend):
                 return moved, form, slack
         raise InputError(
-            f"the line finds no rest{where(model)}: it still moves by {change:.2g} m after "
-            f"{_MOST_STEPS} steps of Newton's method; its wires may be slack there"
+            f"the line has no static equilibrium{where(model)}: it still moves by {change:.2g} "
+            f"m after {_MOST_STEPS} steps of Newton's method; its wires may be slack there"
         )
 
     def _softening(self, about: Model, form: Equilibrium, slack: np.ndarray) -> np.ndarray:

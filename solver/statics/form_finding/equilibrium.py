@@ -341,9 +341,9 @@ def _refuse_twice(mesh: LineMesh, given: np.ndarray) -> None:
         node = int(twice[0])
         name = next(name for name, nodes in mesh.wires.items() if node in nodes)
         raise InputError(
-            f"the line finds no rest: two of its parts are to hold the height of {name} at "
-            f"{mesh.points[node, 0]:g} m, such as an end and a support with holds, or a dropper "
-            "and an arm with holds_height; leave one of them out"
+            "the line has no static equilibrium: two of its parts are to hold the height of "
+            f"{name} at {mesh.points[node, 0]:g} m, such as an end and a support with holds, or a "
+            "dropper and an arm with holds_height; leave one of them out"
         )
 
 

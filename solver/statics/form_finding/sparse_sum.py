@@ -161,9 +161,9 @@ class BandedFactors:
         self._factors, self._pivots, info = lapack.dgbtrf(bands, reach, reach, overwrite_ab=True)
         if info != 0:
             raise InputError(
-                "the line finds no rest: a height is wanted where nothing can give it, or nothing "
-                f"holds a wire (a singular matrix, LAPACK {info}); look at supports with holds, at "
-                "clamps and at ends"
+                "the line has no static equilibrium: a height is wanted where nothing can give it, "
+                f"or nothing holds a wire (a singular matrix, LAPACK {info}); look at supports "
+                "with holds, at clamps and at ends"
             )
 
     def solve(self, right: np.ndarray) -> np.ndarray:

@@ -170,7 +170,7 @@ IDLE = {
     "height that an end has": (
         FREE,
         ["line.links.7.holds=stitch_wire"],
-        "the line finds no rest: two of its parts are to hold the height of stitch_wire at 60 m",
+        "no static equilibrium: two of its parts are to hold the height of stitch_wire at 60 m",
     ),
 }  # fmt: skip
 

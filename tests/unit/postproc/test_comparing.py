@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from catenary.cases.terminal.terminal_text import summary_text
+from catenary.postproc.evaluate.compare import table_row
 from catenary.postproc.evaluate.wording import decimals_that_tell, with_minus
 
 
@@ -65,3 +66,20 @@ def test_a_summary_shows_by_how_little_a_limit_is_missed() -> None:
     assert "real-time factor 76.20, with all records 37.10" in text
     assert "2.0 s from the command to this summary: march 0.2, report 0.8" in text
     assert "FAILED      mean contact force: 143.359, limit 143.356 N" in text
+
+
+@pytest.mark.parametrize(
+    ("values", "cells"),
+    [
+        ([26.8048, 34.6212], ["26.8", "34.6", "7.8"]),  # a deviation is not known to 0.1 mN
+        ([119.2703, 119.0911], ["119.27", "119.09", "-0.18"]),
+        ([119.2703, 119.2706, 240.0], ["119.2703", "119.2706", "240.0000", "3.0e-04", "120.7297"]),
+        ([119.2703, 119.2703], ["119.2703", "119.2703", "0.0000"]),  # equal to all four
+        ([0.0, 0.0], ["0.0", "0.0", "0.0"]),
+        ([1.0, math.nan], ["1.0000", "nan", "nan"]),
+    ],
+)
+def test_compared_figures_have_the_decimals_of_their_difference(
+    values: list[float], cells: list[str]
+) -> None:
+    assert table_row("mean [N]", values).split()[2:] == cells

@@ -14,6 +14,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -27,6 +28,7 @@ from catenary.mbs.shape import HEAD, shape_of
 from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute
 from catenary.postproc.film import animate, drawing, projection, scenery, video
 from catenary.postproc.film.animate import Pictures
+from catenary.postproc.film.chart import ForceChart
 from catenary.postproc.film.film_data import film_data
 from catenary.postproc.film.options import FilmOptions, View
 from catenary.postproc.film.projection import Projection
@@ -36,6 +38,7 @@ from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
+from catenary.postproc.report.pictures.figures import stacked
 
 # HDF5's files are examined, and films written, by processes of their own.
 pytestmark = [pytest.mark.process, pytest.mark.usefixtures("examined_here")]
@@ -767,3 +770,17 @@ def test_memory_does_not_grow_with_a_film(tmp_path: Path) -> None:
         # Of all processes that have ended, ffmpeg is the largest [kB].
         largest.append(1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
     assert largest[1] < largest[0] + 25e6
+
+
+@pytest.mark.parametrize("filtered", [[[5.0], [-12.0], [40.0], [900.0]], [[np.nan]] * 4])
+def test_the_chart_holds_the_filtered_force_below_zero(filtered: list[list[float]]) -> None:
+    """After a loss of contact the filter swings below zero; records beyond the film do not count."""
+    force = np.array([[0.0], [0.0], [35.0], [900.0]])
+    data: Any = SimpleNamespace(
+        force=force, filtered=np.array(filtered), names=["pantograph"], excitation=None
+    )
+    _, (axes,) = stacked(3.0, 1)
+    ForceChart(axes, data, (0, 3), 100.0)
+    low, high = axes.get_ylim()
+    shown = np.concatenate([force[:3], np.array(filtered)[:3]])
+    assert low <= np.nanmin(shown) and np.nanmax(shown) <= high < 100.0

@@ -94,38 +94,40 @@ def told(error: float, *criteria: Criterion, start_share: float = 0.0) -> str:
 def test_an_error_larger_than_the_margin_could_turn_a_verdict() -> None:
     mean = criterion(149.0, 150.0, "<=", "mean_force")
     largest = criterion(345.0, 350.0, "<=", "force_max")
-    assert "could turn the verdict on: mean_force of the run (margin 1.0 N, error 1.50 N)." in told(
-        1.5, mean
+    assert (
+        "could change the verdict on: mean_force of the run (margin 1.0 N, error 1.50 N)."
+        in told(1.5, mean)
     )
     assert "it is smaller than the margin" in told(0.9, mean)
     # Extremes have three times the rms error of the history.
-    assert "could turn the verdict on: force_max of the run" in told(1.7, largest)
+    assert "could change the verdict on: force_max of the run" in told(1.7, largest)
     assert "it is smaller than the margin" in told(1.6, largest)
     # A force that is nearly lost has a margin as well, though no share of its limit, which is zero.
-    assert "could turn the verdict on: force_min of the run (margin 2.0 N, error 3.00 N)." in told(
-        1.0, criterion(2.0, 0.0, ">", "force_min")
+    assert (
+        "could change the verdict on: force_min of the run (margin 2.0 N, error 3.00 N)."
+        in told(1.0, criterion(2.0, 0.0, ">", "force_min"))
     )
     # A failed criterion can be turned as well; what has no estimate cannot be.
-    assert "could turn the verdict on: mean_force of the run (margin -1.0" in told(
+    assert "could change the verdict on: mean_force of the run (margin -1.0" in told(
         1.5, criterion(151.0, 150.0, "<=", "mean_force")
     )
-    assert "turn" not in told(np.nan, mean) and "smaller" not in told(np.nan, mean)
+    assert "change" not in told(np.nan, mean) and "smaller" not in told(np.nan, mean)
 
 
 def test_what_the_start_leaves_is_told_where_it_could_turn_a_verdict() -> None:
     """10 % of a deviation of 30 N are 3 N in the history, and three times that in extremes."""
     spread = criterion(42.0, 45.5, "<=", "force_std")
-    assert "start" not in told(0.1, spread, start_share=0.1)
+    assert "Start" not in told(0.1, spread, start_share=0.1)
     near = criterion(43.0, 45.5, "<=", "force_std")
     assert (
-        "What the start of the run leaves in the evaluated stretch could turn the verdict on: "
+        "Start-up, which still affects the evaluated stretch, could change the verdict on: "
         "force_std of the run (margin 2.5 N, error 3.00 N)."
     ) in told(0.1, near, start_share=0.1)
     largest = criterion(342.0, 350.0, "<=", "force_max")
     assert "force_max of the run (margin 8.0 N, error 9.00 N)" in told(
         0.1, spread, largest, start_share=0.1
     )
-    assert "start" not in told(0.1, near, largest, start_share=0.01)
+    assert "Start" not in told(0.1, near, largest, start_share=0.01)
 
 
 def test_the_nearest_limit_is_the_smallest_share() -> None:
@@ -136,7 +138,7 @@ def test_the_nearest_limit_is_the_smallest_share() -> None:
     lost = criterion(-1.0, 0.0, ">", "force_stat_min")  # failed
     assert told(0.1, mean, largest, farther, zero).startswith(
         "Nearest to its limit: force_max of the run, with a margin of 3.5 N (1.0 %). "
-        "Margins from limits of zero, which have no shares: force_min of the run (1.0 N)."
+        "Margins from limits of zero, without a percentage: force_min of the run (1.0 N)."
     )
     assert "zero" not in told(0.1, mean, lost)
     # A number of the scene stands at its limit on purpose.
@@ -144,9 +146,7 @@ def test_the_nearest_limit_is_the_smallest_share() -> None:
     assert "train_speed" not in told(0.1, mean, speed)
     # One that failed has no margin.
     failed = criterion(150.1, 150.0, "<=", "mean_force")
-    assert told(0.1, failed, largest).startswith(
-        "Nearest to its limit, of those that passed: force"
-    )
+    assert told(0.1, failed, largest).startswith("Passed criterion nearest to its limit: force")
 
 
 def names_in(folder: Path) -> set[str]:

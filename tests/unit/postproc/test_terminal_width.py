@@ -43,7 +43,7 @@ def test_numbers_keep_their_units(width: int) -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        "  mean [N]                              119.2703      119.0911       -0.1793",
+        "  mean [N]                                119.27        119.09         -0.18",
         "Open it with: paraview --script=results/a_folder_of_some_length/paraview/view.py",
         "results/a_folder/with_a_name_of_more_letters/than_a_terminal_shows/report.html",
     ],
