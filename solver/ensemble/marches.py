@@ -14,10 +14,8 @@ from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.ensemble.shared_line import Lane, SharedLine
-from catenary.solver.integrators.line_state import Motion
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
-from catenary.solver.model.switching_links import NO_LINKS
 from catenary.solver.problem.contact_laws import uses_rate
 from catenary.solver.problem.problem import steps_of
 from catenary.solver.schemes.make_scheme import one_solve
@@ -26,7 +24,6 @@ from catenary.solver.schemes.scheme import find_crossings
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.compiled_steps import step_parts
 from catenary.solver.time_loop.prepared_line import make_room, stepped_by_kernels
-from catenary.solver.window.moving_columns import Columns
 
 # Steps between two looks at signals.
 _MOST_STEPS = 4096
@@ -145,14 +142,12 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
         interaction.locate()
         find_crossings(interaction, pantographs, 0.0)
     n_steps = steps_of(problem)
-    steps, rows = _steps(scheme, lane.motion.read, n_steps, problem.numerics.dt)
+    steps, rows = _steps(scheme, n_steps, problem.numerics.dt)
     shared.native.begin(lane.number, steps, n_steps)
     return _OnItsWay(number, at_rest, pantographs.n, rows, n_steps)
 
 
-def _steps(
-    scheme: OneSolve, motion: Motion, n_steps: int, dt: float
-) -> tuple[native.Steps, np.ndarray]:
+def _steps(scheme: OneSolve, n_steps: int, dt: float) -> tuple[native.Steps, np.ndarray]:
     """Compiled steps of a scheme, and the rows (n_steps + 1, n_outputs) that they fill, the first
     one before the first step."""
     pantographs = scheme.pantographs
@@ -162,33 +157,17 @@ def _steps(
     pantographs.fill_drives(times, drives)
     rows = np.zeros((n_steps + 1, pantographs.outputs.size))
     rows[0] = pantographs.outputs
-    shown = _nothing_of_line(motion)
-    parts = step_parts(scheme, heads, free=None, loads=[], shown=shown, channels=[])
-    nothing = np.zeros(0)
-    none = np.zeros(0, dtype=np.int64)
-    kept = native.KeptMotions(
-        none, nothing, np.zeros((0, 3), np.int64), none, none, [], np.zeros((0, 0))
-    )
+    parts = step_parts(scheme, heads, free=None, loads=[], shown=None, channels=[])
     block = native.Block(
         times=times,
         drives=drives,
         rows=rows[1:],
-        now=np.array([0, 1]),
-        behind=np.tile(np.array([0, 1]), (n_steps, 1)),
-        kept=kept,
+        now=np.zeros(2, dtype=np.int64),
+        behind=np.zeros((0, 2), dtype=np.int64),
+        kept=None,
         counts=np.zeros(1, dtype=native.COUNTS),
     )
     return native.Steps(parts, block), rows
-
-
-def _nothing_of_line(motion: Motion) -> native.Shown:
-    """Parts of the rows with values of the line."""
-    no_dependents = native.Dependents(NO_LINKS, np.zeros(1, dtype=np.int64))
-    ends = np.array([0, 1])
-    columns = Columns(ends, ends, *np.zeros((2, 2, 3), dtype=np.int32))
-    none = np.zeros(0, dtype=np.int64)
-    links = NO_LINKS, NO_LINKS, no_dependents, no_dependents
-    return native.Shown(motion, none, *links, np.zeros(0), columns)
 
 
 def _ended(

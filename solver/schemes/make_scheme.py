@@ -105,34 +105,22 @@ class SchemeFactory:
             pantographs.work,
         )
         if opens_window(problem, comm.size, line.passes is not None):
-            self._open_window(problem, model, line, interaction, pantographs)
+            assert line.passes is not None
+            window = MovingWindow(
+                problem.window,
+                numerics.dt,
+                model,
+                line.passes.factors,
+                pantographs.candidates.place,
+                interaction.reach,
+                links.links.unknowns,
+                links.moving,
+                line.passes.known,
+                line.operators.in_pieces,
+            )
+            line.open_window(window)
         scheme = SCHEMES[numerics.scheme](own, problem, model, interaction, pantographs)
         return Parts(line, interaction, pantographs, scheme)
-
-    def _open_window(
-        self,
-        problem: Problem,
-        model: Model,
-        line: LineIntegrator,
-        interaction: ForcesOnLine,
-        pantographs: Pantographs,
-    ) -> None:
-        """Restrict steps of the line to a window at the train. One rank only."""
-        assert line.passes is not None
-        links, reach = interaction.links, interaction.reach
-        window = MovingWindow(
-            problem.window,
-            problem.numerics.dt,
-            model,
-            line.passes.factors,
-            pantographs.candidates.place,
-            reach,
-            links.links.unknowns,
-            links.moving,
-            line.passes.known,
-            line.operators.in_pieces,
-        )
-        line.open_window(window)
 
 
 def one_solve(

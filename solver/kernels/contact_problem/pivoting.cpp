@@ -258,8 +258,7 @@ class Shares : public Map {
     std::span<bool> is_sought_ = room_.marks[0].first(n_), free_ = room_.marks[1].first(n_);
 };
 
-}  // namespace
-
+/// Solve by pivoting. Returns the rounds needed, which are not positive if there is no solution.
 int64_t pivot(const System& system, const Signs& signs, const Room& room) {
     std::ranges::copy(signs.always, room.acts.begin());
     find_bends(system, room);
@@ -272,6 +271,8 @@ int64_t pivot(const System& system, const Signs& signs, const Room& room) {
     const int64_t rounds = pivoted.rounds + shares.rounds();
     return found ? rounds : -rounds;
 }
+
+}  // namespace
 
 Found find_solution(const System& system, const Signs& signs, int64_t max_rounds,
                     const Room& room) {

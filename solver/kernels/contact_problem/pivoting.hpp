@@ -24,12 +24,9 @@ struct Found {
     bool pivoted;    ///< whether the active set cycled
 };
 
-/// Solve for signs by the active set, and by `pivot` where that does not settle.
+/// Solve for signs by the active set, and where that does not settle within some rounds by Murty's
+/// least-index pivoting: slower, but it cannot cycle for a P-matrix. Dependents go with their
+/// leaders, in part if there is no other solution.
 Found find_solution(const System& system, const Signs& signs, int64_t max_rounds, const Room& room);
-
-/// Murty's least-index pivoting: slower, but it cannot cycle for a P-matrix. Dependents go with
-/// their leaders, in part if there is no other solution. Returns the rounds needed, which are not
-/// positive if there is no solution.
-int64_t pivot(const System& system, const Signs& signs, const Room& room);
 
 }  // namespace catenary

@@ -79,7 +79,6 @@ void offer_contact(py::module_& module) {
     offer(module, "leaves_out", leaves_out, "n, m, w=3n+2, n=n, *");
     offer(module, "solve", solve_problem, "n=n, n=n");
     offer(module, "find_solution", find_signed, "m=m, m=m");
-    offer(module, "pivot", pivot, "m=m, m=m");
     offer(module, "find_zero", find_zero_of, "");
     module.attr("MOST_TANGENTS") = kMostTangents;
     offer(module, "linearise", linearise, "n=n, n, n");

@@ -109,7 +109,6 @@ void Simulation::make_steps() {
     block.times = times_;
     block.drives = {drive_.data(), 1, ahead.drives.rows, ahead.drives.columns};
     block.now = now_;
-    block.kept.moved = moved_;
     block.counts = counts_;
     steps_.emplace(parts, block);
     state_size_ = sizeof(Place) + inputs_.size() * sizeof(Input);
@@ -140,7 +139,7 @@ bool Simulation::has_turned() const {
     const Ahead& ahead = line_.ahead;
     const int64_t n = size(ahead.turns), part = n_done_ % ahead.look_steps;
     for (int64_t k = n * part / ahead.look_steps; k < n * (part + 1) / ahead.look_steps; ++k)
-        if (!(std::abs(displacement_at(ahead.turns[k], line_.steps.shown.motion)) <=
+        if (!(std::abs(displacement_at(ahead.turns[k], line_.steps.contacts.motion)) <=
               ahead.most_turn))
             return true;
     return false;

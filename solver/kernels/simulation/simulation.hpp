@@ -128,7 +128,7 @@ class Simulation {
     std::vector<Input> inputs_;
     // The block of one step.
     std::vector<double> times_ = {0.0}, drive_;
-    std::vector<int64_t> now_ = {0, 0}, moved_ = {0, 0};
+    std::vector<int64_t> now_ = {0, 0};
     std::vector<Counts> counts_ = {Counts{}};
     std::optional<Steps> steps_;
     int64_t n_done_ = 0;

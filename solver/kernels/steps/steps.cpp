@@ -22,32 +22,35 @@ Steps::Steps(StepParts parts, Block block)
                       "a row that drives a head has too few numbers");
     }
     if (block_.rows.rows == 0) return;
-    size_t width = parts_.outputs.size() + parts_.shown.arms.size();
-    width += parts_.shown.droppers.law.size();
+    size_t width = parts_.outputs.size();
+    if (parts_.shown) width += parts_.shown->arms.size() + parts_.shown->droppers.law.size();
     for (const auto& channel : parts_.channels) width += channel.size();
-    refuse_unless(block_.rows.rows >= n_steps() && block_.behind.rows >= n_steps() &&
-                      block_.behind.columns == 2 &&
-                      block_.rows.columns == static_cast<int64_t>(width),
-                  "a block has no room for its outputs");
+    refuse_unless(!parts_.shown || (block_.kept && block_.behind.rows >= n_steps() &&
+                                    block_.behind.columns == 2),
+                  "a block does not keep what moves on its line");
+    refuse_unless(
+        block_.rows.rows >= n_steps() && block_.rows.columns == static_cast<int64_t>(width),
+        "a block has no room for its outputs");
 }
 
 Taken Steps::take(int64_t first, int64_t end) {
-    const KeptMotions& kept = block_.kept;
+    const std::optional<KeptMotions>& kept = block_.kept;
     const bool shows = block_.rows.rows > 0;
     part(block_.times, first, end);
-    part(kept.moved, 0, 2);
-    if (shows) part(kept.motion_of, first, end);
-    if (!parts_.free) throw std::invalid_argument("these steps are taken by an ensemble");
+    if (kept) part(kept->moved, 0, 2);
+    if (shows) part(kept.value().motion_of, first, end);
+    if (!parts_.free || !parts_.shown)
+        throw std::invalid_argument("these steps are taken by an ensemble");
     for (int64_t number = first; number < end; ++number) {
         set_off(number);
         parts_.free->step();
-        take_in(block_.now, parts_.shown.columns.ends);
-        take_in(block_.kept.moved, parts_.shown.columns.ends);
+        take_in(block_.now, parts_.shown->columns.ends);
+        if (kept) take_in(kept->moved, parts_.shown->columns.ends);
         if (!arrive(number)) return {number - first, true, false};
         if (!shows) continue;
         show(number);
-        const int64_t motion = kept.motion_of[number];
-        if (motion >= 0 && !keep(kept, motion, parts_.shown.motion, parts_.shown.columns))
+        const int64_t motion = kept->motion_of[number];
+        if (motion >= 0 && !keep(*kept, motion, parts_.shown->motion, parts_.shown->columns))
             return {number + 1 - first, false, true};
     }
     return {end - first, false, false};
@@ -123,7 +126,7 @@ void Steps::finish(int64_t n_compensations) {
 
 /// Check that the results of a step are finite, in builds that search for faults.
 void Steps::check() const {
-    const auto& [x, y, z, shares, spacing] = parts_.shown.motion;
+    const auto& [x, y, z, shares, spacing] = parts_.contacts.motion;
     for (auto numbers : {x, y, z}) check_numbers(numbers, "the line's motion");
     for (const Head* head : parts_.heads) check_numbers(head->arrays().state, "a head's motion");
     check_numbers(parts_.train_outputs.contact_force, "contact forces");
@@ -138,12 +141,14 @@ void Steps::show(int64_t number) {
         row = row.subspan(n);
         return first;
     };
-    const Shown& shown = parts_.shown;
     std::ranges::copy(parts_.outputs, next(parts_.outputs.size()).begin());
-    const auto uplift = next(shown.arms.size()), tension = next(shown.droppers.law.size());
-    const auto behind = block_.behind[number];
-    catenary::show(shown, uplift, tension, std::min(block_.now[0], behind[0]),
-                   std::max(block_.now[1], behind[1]));
+    if (parts_.shown) {
+        const Shown& shown = *parts_.shown;
+        const auto uplift = next(shown.arms.size()), tension = next(shown.droppers.law.size());
+        const auto behind = block_.behind[number];
+        catenary::show(shown, uplift, tension, std::min(block_.now[0], behind[0]),
+                       std::max(block_.now[1], behind[1]));
+    }
     copy_all(parts_.channels, row);
 }
 

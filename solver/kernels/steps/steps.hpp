@@ -1,6 +1,8 @@
 #pragma once
 // Steps of the scheme `one_solve` on one rank: a step of the line without contact, the small
 // problem of contact forces and switching links, and the motion of line and pantographs by both.
+#include <optional>
+
 #include "contact/outputs.hpp"
 #include "contact/response.hpp"
 #include "contact_problem/forces.hpp"
@@ -26,7 +28,7 @@ struct StepParts {
     std::span<int64_t> switched;      ///< room for the numbers of links with a compensation
     TrainOutputs train_outputs;       ///< part of `outputs` that a step fills in
     std::span<const double> outputs;  ///< all outputs of pantographs
-    Shown shown;                      ///< outputs of the line
+    std::optional<Shown> shown;       ///< outputs of the line, none if others take them
     std::vector<std::span<const double>> channels;  ///< numbers of further channels
     CATENARY_RECORD(speed, contacts, train, free, loads, heads, strips, problem, law, lateral_place,
                     switched, train_outputs, outputs, shown, channels)
@@ -35,13 +37,13 @@ struct StepParts {
 
 /// Inputs and outputs of a block of steps.
 struct Block {
-    std::span<const double> times;  ///< (n,) at their ends [s]
-    Array3<double> drives;          ///< (n, n_heads, width) a row for each head, see `Drive`
-    Array2<double> rows;            ///< (n, width) outputs of each step; none without observers
-    std::span<int64_t> now;         ///< stations that move in this block, first and last + 1
-    Array2<const int64_t> behind;   ///< (n, 2) of each row, stations moved since it was filled
-    KeptMotions kept;
-    std::span<Counts> counts;  ///< (1,)
+    std::span<const double> times;    ///< (n,) at their ends [s]
+    Array3<double> drives;            ///< (n, n_heads, width) a row for each head, see `Drive`
+    Array2<double> rows;              ///< (n, width) outputs of each step; none without observers
+    std::span<int64_t> now;           ///< stations that move in this block, first and last + 1
+    Array2<const int64_t> behind;     ///< (n, 2) of each row, stations moved since it was filled
+    std::optional<KeptMotions> kept;  ///< of steps with rows
+    std::span<Counts> counts;         ///< (1,)
     CATENARY_RECORD(times, drives, rows, now, behind, kept, counts)
     CATENARY_SHAPES("n, n h w, *, 2, *, *, 1")
 };

@@ -292,13 +292,13 @@ void TangentSteps::show(const Tangent& tangent, int64_t number) const {
             tangent.law.latest[i] = solution_[i];
         }
     }
-    const auto heights = row.subspan(n_pantographs + size(parts().shown.arms));
+    const auto heights = row.subspan(n_pantographs + size(parts().shown.value().arms));
     for (int64_t p = 0; p < n_pantographs; ++p) heights[p] = heads_.height(p, tangent.heads[p]);
 }
 
 /// Fill in the displacements at arms in the rows of a group.
 void TangentSteps::show_arms(const TangentGroup& group, int64_t number) const {
-    const auto arms = parts().shown.arms;
+    const auto arms = parts().shown.value().arms;
     const int64_t n_pantographs = size(parts().train_outputs.ends.of_pantograph) - 1;
     for (size_t s = 0; s < group.tangents.size(); ++s) {
         const auto row = group.tangents[s].results[number].subspan(n_pantographs);
