@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.base.options import option
-from catenary.base.paths import is_file, is_folder, is_there
+from catenary.base.paths import is_folder, is_there
 from catenary.cases.result_folder.folder_lock import refusal
 from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.own_files import (
@@ -81,7 +81,8 @@ def prepare(folder: Path, force: bool) -> None:
 def run_folder(path: str | Path) -> Path:
     """The folder of a run, for which its result file may stand. Not collective."""
     path = Path(path)
-    return path.parent if path.name == RUN_FILE and is_file(path) else path
+    # Options are read by this: what cannot be looked up is told by the verb.
+    return path.parent if path.name == RUN_FILE and os.path.isfile(path) else path
 
 
 def refuse_impossible(folder: Path) -> None:

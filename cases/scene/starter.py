@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import re
 import tempfile
 import tomllib
@@ -95,7 +96,7 @@ def write_case(
     copied = {SPANS_FILE: spans, DROPPERS_FILE: droppers}
     files = {name: read_whole(path, f"{path}") for name, path in copied.items() if path is not None}
     lengths = [] if spans is None else span_table(spans)
-    text = starting_text(kind, folder.resolve().name, lengths, droppers is not None)
+    text = starting_text(kind, Path(os.path.realpath(folder)).name, lengths, droppers is not None)
     there = next(path for path in folder.absolute().parents if path.is_dir())
     with tempfile.TemporaryDirectory(dir=there, prefix=".new-case") as made:
         inner = Path(made, "case")

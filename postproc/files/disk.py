@@ -303,7 +303,9 @@ def write_all(folder: Path, content: Mapping[str, bytes | str]) -> list[Path]:
         If one cannot be written.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        # `parents=True` calls itself for each folder, and a path may have a thousand.
+        for one in reversed([one for one in (folder, *folder.parents) if not one.is_dir()]):
+            one.mkdir(exist_ok=True)
     except OSError as error:
         raise unwritten(folder, error) from error
     return write_into(folder, content)

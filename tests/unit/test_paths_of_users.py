@@ -12,6 +12,8 @@ from verb_runner import invoke
 from catenary import InputError
 from catenary import open as open_run
 from catenary.base import paths
+from catenary.cases.result_folder.output_folder import run_folder
+from catenary.postproc.files.disk import write_all
 
 TOO_LONG = "x" * 300
 VERBS = {
@@ -47,7 +49,7 @@ def test_a_folder_of_another_user_is_told(tmp_path: Path, monkeypatch: pytest.Mo
     stat = os.stat
 
     def refuses(path: Any, **how: Any) -> os.stat_result:
-        if Path(path).name == "theirs":
+        if "theirs" in Path(path).parts:
             raise PermissionError(13, "Permission denied", str(path))
         return stat(path, **how)
 
@@ -57,9 +59,29 @@ def test_a_folder_of_another_user_is_told(tmp_path: Path, monkeypatch: pytest.Mo
         for asks in (paths.is_file, paths.is_folder, paths.is_there, open_run):
             with pytest.raises(InputError, match=told):
                 asks(tmp_path / "theirs")
+        # Not by the parser of the option, whose errors nobody catches.
+        assert run_folder(tmp_path / "theirs" / "run.h5") == tmp_path / "theirs" / "run.h5"
 
 
 def test_links_in_a_circle_name_nothing(tmp_path: Path) -> None:
     (tmp_path / "a").symlink_to("a")
     assert not paths.is_there(tmp_path / "a") and not paths.is_file(Path("a\0b"))
     assert paths.is_folder(tmp_path) and not paths.is_there(tmp_path / "a" / "b")
+
+
+def test_folders_of_any_depth_are_made(tmp_path: Path) -> None:
+    (tmp_path / "stays").touch()
+    deep = tmp_path / "/".join("a" * 1500)
+    (made,) = write_all(deep, {"b": "c"})
+    assert made.read_text() == "c"
+    made.unlink()
+    os.removedirs(deep)  # pytest removes folders by a recursion
+
+
+def test_a_new_case_at_a_link_in_a_circle_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a").symlink_to("a")
+    result = invoke("new", "a")
+    assert result.exit_code == 2 and result.stderr.startswith("catenary: a cannot be made"), result
