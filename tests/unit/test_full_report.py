@@ -13,6 +13,7 @@ from pathlib import Path
 from unittest import mock
 
 import html5lib
+import numpy as np
 import pypdf
 import pytest
 import verb_runner
@@ -45,8 +46,9 @@ from catenary.cases.studies.reference.pages import validation_files
 from catenary.cases.studies.reference.validation import Step, Validation
 from catenary.postproc.files.own_files import OWN_FILES
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures import interactive
+from catenary.postproc.report.pictures import channel_pictures, interactive
 from catenary.postproc.report.study_table import write_files
+from catenary.solver.time_loop.views.channels import CHANNELS
 
 CHANGES = ("train.speed_km_h=280", "line.contact_wire.tension_N=21e3")
 
@@ -394,3 +396,19 @@ def test_costs_of_another_case_or_of_other_effects_are_refused(
     (tmp_path / "cost.json").write_text("{}")
     with pytest.raises(InputError, match="is no record of `catenary plan --cost`"):
         measured_costs(scene, tmp_path)
+
+
+def test_a_channel_of_some_millimetres_is_drawn_in_millimetres(tmp_path: Path) -> None:
+    """A contact wire moves sideways by less than 10 mm."""
+    quiet = "-q", "--no-report", "--set", "output.field_every_s=0"
+    invoke("run", "ac_simple_3d", "--short", "-o", str(tmp_path), *quiet)
+    name = "lateral_displacement"
+    with Results(tmp_path) as results:
+        largest = 1e3 * float(np.nanmax(results.column(name, 0)))
+        drawn = {file: draw for file, _, draw in channel_pictures.channel_pictures(results)}
+        figure = drawn[channel_pictures.picture_name(CHANNELS[name])]()
+    assert figure is not None and 1.0 < largest < 100.0
+    (axes,) = figure.axes
+    assert axes.get_ylabel() == "lateral displacement [mm]"
+    (curve,) = (line for line in axes.get_lines() if line.get_label() == "lateral displacement")
+    assert np.nanmax(curve.get_ydata()) == pytest.approx(largest)

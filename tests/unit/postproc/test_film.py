@@ -774,7 +774,7 @@ def test_memory_does_not_grow_with_a_film(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("filtered", [[[5.0], [-12.0], [40.0], [900.0]], [[np.nan]] * 4])
 def test_the_chart_holds_the_filtered_force_below_zero(filtered: list[list[float]]) -> None:
-    """After a loss of contact the filter swings below zero; records beyond the film do not count."""
+    """After a loss of contact the filter swings below zero; later records do not count."""
     force = np.array([[0.0], [0.0], [35.0], [900.0]])
     data: Any = SimpleNamespace(
         force=force, filtered=np.array(filtered), names=["pantograph"], excitation=None
