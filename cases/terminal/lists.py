@@ -21,6 +21,7 @@ from catenary.cases.scene.keys.table import OneOrMore
 from catenary.cases.scene.keys.units import unit_of
 from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
 from catenary.cases.scene.scene import Scene
+from catenary.meshgen.topologies.all_topologies import registered
 from catenary.postproc.evaluate.terminal_width import terminal_width
 from catenary.postproc.standards.book import Rule, RuleBook
 from catenary.postproc.standards.library import DEFAULT, book_named, editions_of, shipped
@@ -327,6 +328,9 @@ def scene_schema() -> dict[str, Any]:
         ``catenary check``.
     """
     schema = Scene.model_json_schema(schema_generator=_AsWritten)
+    # Words that messages list themselves: fields of any text, which checks look at.
+    schema["$defs"]["LineTable"]["properties"]["topology"]["enum"] = list(registered())
+    schema["$defs"]["EvaluationTable"]["properties"]["system"]["enum"] = list(SYSTEMS)
     schema["$schema"] = GenerateJsonSchema.schema_dialect
     schema["title"] = "case.toml of Catenary"
     for table in (schema, *schema["$defs"].values()):

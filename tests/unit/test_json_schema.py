@@ -47,6 +47,8 @@ def test_a_shipped_scene_fits(file: Path) -> None:
         ("line", "span_m", -1.0, "$.line.span_m"),
         ("numerics", "integrator", "euler", "$.numerics.integrator"),
         ("effects", "lateral_motoin", True, "$.effects"),
+        ("line", "topology", "stiched", "$.line.topology"),
+        ("evaluation", "system", "ac_25_kV", "$.evaluation.system"),
         ("evaluation", "edition", True, "$.evaluation.edition"),
     ],
 )

@@ -125,12 +125,13 @@ def test_files_beside_a_case_are_found_from_anywhere(tmp_path: Path) -> None:
         ("spans.csv", "55\n55\n", 'its column "55" is unknown: it takes span_m, span'),
         ("spans.csv", "span\n1\n", "it has no column span_m: its first line names the columns"),
         ("spans.csv", "spam_m\n55\n", "did you mean span_m?"),
+        ("spans.csv", "length_m\n55\n", 'its column "length_m" is unknown: it takes span_m, span'),
         ("spans.csv", "span_m\n", "it holds no line of numbers below the names of columns"),
         ("spans.csv", "span_m\n55\n60 m\n", 'a number for each of span_m, and is "60 m"'),
         ("spans.csv", "span_m\n55\nnan\n", "its line 3 must hold a number for each of span_m"),
         ("spans.csv", "span,span_m\n1,55\n3,55\n", "its line 3 must be about span 2"),
         ("spans.csv", "span_m,span_m\n55,55\n", "it has several columns span_m"),
-        ("spans.csv", "span_m\n55\n900\n", "line.span_m.1 is 900"),
+        ("spans.csv", "span_m\n55\n900\n" + "55\n" * (N - 2), "line.span_m.1 is 900"),
         (
             "droppers.csv",
             "span,position_m\n2,5\n1,5\n",
@@ -153,6 +154,11 @@ def test_files_beside_a_case_are_found_from_anywhere(tmp_path: Path) -> None:
             "droppers.csv",
             droppers().replace("\n3,50.5,", "\n3,56.0,"),
             "puts a dropper of span 3 at 56 m",
+        ),
+        (
+            "droppers.csv",
+            droppers() + "99,5.0,0\n",
+            f"it has droppers of span 99, and line.spans_file has {N} spans",
         ),
     ],
 )

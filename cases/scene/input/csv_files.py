@@ -39,6 +39,7 @@ def take_in_files(
     directory.
     """
     taken, faults = list(origin.taken_in), []
+    most: int | None = None  # spans of a file, of which the scene may take the first ones alone
     for where, table, named, key, read in _places(raw):
         name = table.get(named) if isinstance(table, dict) else None
         if not isinstance(name, str) or not name:
@@ -56,7 +57,13 @@ def take_in_files(
                     f"{file_key} is {shown(name)} {origin.of(file_key)}; {pairs_key} is given too: "
                     "take one of them away"
                 )
-            table[key] = read(path, f"{file_key} is {_named(name)} {origin.of(file_key)}", raw)
+            begin = f"{file_key} is {_named(name)} {origin.of(file_key)}"
+            if read is _patterns:
+                table[key] = _patterns(path, begin, raw, most)
+            else:
+                table[key] = read(path, begin, raw)
+            if read is _spans:
+                most = len(span_table(path))
             taken.append((pairs_key, str(path)))
         except InputError as error:
             faults.append(Fault(where, str(error)))
@@ -211,9 +218,19 @@ def dropper_table(
     return hung
 
 
-def _patterns(path: Path, where: str, raw: dict[str, Any]) -> list[dict[str, Any]]:
-    """Droppers of all spans, like spans together; spans beyond the line are left out."""
+def _patterns(
+    path: Path, where: str, raw: dict[str, Any], n_in_file: int | None = None
+) -> list[dict[str, Any]]:
+    """Droppers of all spans, like spans together; spans beyond the line are left out.
+
+    Those of ``n_in_file`` spans, if their lengths stand in a file: other spans are another line's.
+    """
     hung = dropper_table(path, where, DROPPER_COLUMNS)
+    if n_in_file is not None and max(hung) > n_in_file:
+        raise InputError(
+            f"{where}; it has droppers of span {max(hung)}, and line.spans_file has {n_in_file} "
+            "spans: do both belong to this line?"
+        )
     n = raw["line"].get("n_spans")
     most = n if isinstance(n, int) else max(hung)
     like: dict[tuple[tuple[float, ...], ...], list[int]] = {}
@@ -302,7 +319,7 @@ def _rows(path: Path, where: str, columns: dict[str, bool]) -> list[tuple[int, d
 def _check_names(where: str, named: list[str], columns: dict[str, bool]) -> None:
     takes = f"it takes {', '.join(columns)}"
     for name in named:
-        if name == "length_m" and name not in columns:
+        if name == "length_m" and name not in columns and "position_m" in columns:
             raise InputError(
                 f"{where}; droppers are cut for the pre-sag, so that it takes no length_m: give "
                 "pre_sag_mm, which `catenary new --droppers` finds from lengths"
