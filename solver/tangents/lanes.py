@@ -8,16 +8,9 @@ import numpy as np
 
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import PredictedLineState
-from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.model.alike import kinds_of
+from catenary.solver.kernels import native
+from catenary.solver.tangents.changed_rows import changed_rows
 from catenary.solver.tangents.set_up import Change
-
-# Numbers of matrices are kept to so many bits, far more than differences of set-ups know: rows of
-# equal elements are equal then.
-_BITS = 40
-# Pairs of rows that are taken at a time, so that their sums stay near the processor.
-_PAIRS_AT_A_TIME = 64
-_NO_NUMBERS = np.zeros(0, dtype=np.int64)
 
 
 def groups_of(line: LineIntegrator, changes: Sequence[Change]) -> list[list[int]]:
@@ -73,7 +66,7 @@ def lanes_of(
             own,
             size,
             any(change.loads_line for change in group),
-            _rows(group, size, n, shares),
+            changed_rows(group, size, n, shares),
         )
         for group, own, size in zip(groups, starts, sizes, strict=True)
     ]
@@ -107,65 +100,3 @@ def _lanes(
     guard = line.windows.n_stations if waits else 0
     stepped = native.LanePasses(parts, guard)
     return native.TangentLanes(stepped, arrays.motion, arrays.loads, rows)
-
-
-def _rows(
-    changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray
-) -> native.ChangedRows:
-    """Changes of matrices over all lanes, with a kind for pairs of rows that are equal.
-
-    The largest matrix of each lane is multiplied with the first sums, its next with the second
-    ones. ``shares`` are those of the march's motion.
-    """
-    # Displacement, velocity and acceleration in terms of x, y and z.
-    of_motion = np.array([shares[:3], [0.0, *shares[3:]], [0.0, 0.0, 1.0]])
-    terms = [
-        (lane, place, term)
-        for lane, change in enumerate(changes)
-        for place, term in enumerate(sorted(change.matrices, key=lambda term: -term.values.size))
-    ]
-    n_terms = 1 + max((place for _, place, _ in terms), default=0)
-    weights = np.zeros((n_terms, 3, n_lanes))
-    rows, columns, lanes, places, values = ([_NO_NUMBERS] for _ in range(5))
-    for lane, place, term in terms:
-        weights[place, :, lane] = term.weights @ of_motion
-        rows.append(np.repeat(term.rows, np.diff(term.begin)))
-        columns.append(term.columns)
-        lanes.append(np.full(term.values.size, lane))
-        places.append(np.full(term.values.size, place))
-        values.append(_rounded(term.values))
-    row = np.concatenate(rows)
-    # Each entry of a pair of rows once for all lanes, by pairs.
-    number = (row // 2 * n_terms + np.concatenate(places)) * n + np.concatenate(columns)
-    entries, entry = np.unique(number, return_inverse=True)
-    numbers = np.zeros((entries.size, 2, n_lanes))
-    numbers[entry, row % 2, np.concatenate(lanes)] = np.concatenate(values)
-    part, column = np.divmod(entries, n)
-    pair, at = np.divmod(part, n_terms)
-    ahead = column - 2 * pair
-    reach = int(np.abs(ahead).max(initial=0))
-    room = 2 * (_PAIRS_AT_A_TIME + reach)
-    offsets = (at * room + ahead).astype(np.int32)
-    ends = np.searchsorted(pair, np.arange((n + 1) // 2 + 1))
-    counts = np.diff(ends)
-    of_pairs = np.full((counts.size, counts.max()), -1.0)
-    of_entries = np.c_[offsets, numbers.reshape(-1, 2 * n_lanes)]
-    of_pairs[pair, np.arange(pair.size) - ends[pair]] = kinds_of(of_entries)[1]
-    first, kinds = kinds_of(of_pairs)
-    which = np.isin(pair, first)
-    return native.ChangedRows(
-        weights.reshape(-1, 3 * n_lanes),
-        kinds,
-        begin=np.cumsum([0, *counts[first]], dtype=np.int64),
-        offsets=offsets[which],
-        values=aligned_arrays.copy(numbers[which]).reshape(-1, 2 * n_lanes),
-        reach=reach,
-        room=room,
-        sums=aligned_arrays.zeros(n_terms * room * n_lanes, 4),
-    )
-
-
-def _rounded(values: np.ndarray) -> np.ndarray:
-    """Numbers with ``_BITS`` bits."""
-    mantissa, exponent = np.frexp(values)
-    return np.ldexp(np.round(np.ldexp(mantissa, _BITS)), exponent - _BITS)

@@ -10,9 +10,9 @@ namespace catenary {
 namespace {
 
 /// Contact forces that a head's laws read; empty without laws.
-std::span<double> laws_of(const Head& head) {
+std::span<double> pressed_of(const Head& head) {
     const auto* sprung = dynamic_cast<const SprungHead*>(&head);
-    return sprung ? sprung->laws().pressed : std::span<double>{};
+    return sprung && !sprung->laws().law.empty() ? sprung->laws().pressed : std::span<double>{};
 }
 
 /// By how much a state is changed to differentiate a step: heights and their rates little beside
@@ -34,7 +34,7 @@ HeadTangents::HeadTangents(std::vector<Head*> heads, std::vector<std::vector<Hea
         chains_.push_back(dynamic_cast<const LinearChain*>(&head));
         if (!chains_.back() && pairs_[h].size() != 2)
             throw std::invalid_argument("a head is no linear chain and has no pair");
-        pressed_.emplace_back(laws_of(head).size());
+        pressed_.emplace_back(pressed_of(head).size());
         row_.resize(std::max<size_t>(row_.size(), kDrive + 2 * head.n_strips()));
         before_.emplace_back(3 * head.n());
         free_.emplace_back(3 * head.n());
@@ -44,7 +44,7 @@ HeadTangents::HeadTangents(std::vector<Head*> heads, std::vector<std::vector<Hea
 void HeadTangents::keep() {
     for (size_t h = 0; h < n(); ++h) {
         std::ranges::copy(heads_[h]->arrays().state, before_[h].begin());
-        if (!pressed_[h].empty()) std::ranges::copy(laws_of(*heads_[h]), pressed_[h].begin());
+        if (!pressed_[h].empty()) std::ranges::copy(pressed_of(*heads_[h]), pressed_[h].begin());
     }
 }
 
@@ -171,7 +171,7 @@ void HeadTangents::step_beside(const HeadChange& change, std::span<const double>
 
 void HeadTangents::put_state(Head& head, size_t h) const {
     std::ranges::copy(before_[h], head.arrays().state.begin());
-    if (!pressed_[h].empty()) std::ranges::copy(pressed_[h], laws_of(head).begin());
+    if (!pressed_[h].empty()) std::ranges::copy(pressed_[h], pressed_of(head).begin());
 }
 
 /// Take a step with the forces that were found.

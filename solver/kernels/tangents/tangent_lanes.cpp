@@ -10,68 +10,76 @@ namespace catenary {
 
 namespace {
 
-/// Put the sums of the march's motion from unknown `begin` to `end` with the weights of a term.
+/// Sums of the march's motion with weights.
 template <int64_t L>
-[[gnu::always_inline]] inline void add_up(const Motion& march, const double* weights, int64_t begin,
-                                          int64_t end, double* sums) {
-    const typename SideBySide<L>::Numbers by_x = SideBySide<L>::at(weights),
-                                          by_y = SideBySide<L>::at(weights + L),
-                                          by_z = SideBySide<L>::at(weights + 2 * L);
-    const double *x = march.x.data(), *y = march.y.data(), *z = march.z.data();
-    for (int64_t u = begin; u < end; ++u)
-        SideBySide<L>::at(sums + L * (u - begin)) = x[u] * by_x + y[u] * by_y + z[u] * by_z;
-}
-
-/// Put the loads of pairs of rows from `first` to `last` by sums that begin with unknown `from`.
-template <int64_t L>
-[[gnu::always_inline]] inline void multiply(const ChangedRows& rows, int64_t first, int64_t last,
-                                            int64_t from, double* loads) {
+struct Sums {
     using Numbers = typename SideBySide<L>::Numbers;
-    const int64_t* begin = rows.begin.data();
-    const int32_t* offsets = rows.offsets.data();
-    const double *values = rows.values.data, *sums = rows.sums.data();
-    for (int64_t pair = first; pair < last; ++pair) {
-        const double* own = sums + L * (2 * pair - from);
-        // Two entries at a time, whose sums do not wait for each other.
-        Numbers one{}, other{}, next_one{}, next_other{};
-        const auto subtract = [&](int64_t k, Numbers& one, Numbers& other)
-                                  __attribute__((always_inline)) {
-                                      const Numbers sum = SideBySide<L>::at(own + L * offsets[k]);
-                                      one -= sum * SideBySide<L>::at(values + 2 * L * k);
-                                      other -= sum * SideBySide<L>::at(values + 2 * L * k + L);
-                                  };
-        int64_t k = begin[rows.kinds[pair]];
-        const int64_t end = begin[rows.kinds[pair] + 1];
-        for (; k + 1 < end; k += 2) {
-            subtract(k, one, other);
-            subtract(k + 1, next_one, next_other);
-        }
-        if (k < end) subtract(k, one, other);
-        SideBySide<L>::at(loads + 2 * L * pair) = one + next_one;
-        SideBySide<L>::at(loads + 2 * L * pair + L) = other + next_other;
+    Numbers by_x, by_y, by_z;
+    const double *x, *y, *z;
+
+    [[gnu::always_inline]] Sums(const double* weights, const Motion& march)
+        : by_x(SideBySide<L>::at(weights)),
+          by_y(SideBySide<L>::at(weights + L)),
+          by_z(SideBySide<L>::at(weights + 2 * L)),
+          x(march.x.data()),
+          y(march.y.data()),
+          z(march.z.data()) {}
+    [[gnu::always_inline]] Numbers at(int64_t u) const {
+        return by_x * x[u] + by_y * y[u] + by_z * z[u];
+    }
+};
+
+/// Put minus the products of nodes along a wire, whose numbers stay in registers, as do the sums at
+/// a node and at those beside it.
+template <int64_t L>
+[[gnu::always_inline]] inline void multiply(std::span<const int64_t> run, const double* numbers,
+                                            const Sums<L>& sums, double* loads) {
+    using Numbers = typename SideBySide<L>::Numbers;
+    const Numbers own = SideBySide<L>::at(numbers), level = SideBySide<L>::at(numbers + L),
+                  turned = SideBySide<L>::at(numbers + 2 * L),
+                  own_turned = SideBySide<L>::at(numbers + 3 * L),
+                  sloping = SideBySide<L>::at(numbers + 4 * L),
+                  bent = SideBySide<L>::at(numbers + 5 * L);
+    const int64_t step = 2 * run[2];
+    int64_t u = 2 * run[0];
+    Numbers w0 = sums.at(u - step), r0 = sums.at(u - step + 1), w1 = sums.at(u),
+            r1 = sums.at(u + 1);
+    for (int64_t k = 0; k < run[1]; ++k, u += step) {
+        const Numbers w2 = sums.at(u + step), r2 = sums.at(u + step + 1);
+        SideBySide<L>::at(loads + L * u) = own * w1 + level * (w0 + w2) + turned * (r2 - r0);
+        SideBySide<L>::at(loads + L * (u + 1)) =
+            own_turned * r1 + sloping * (w2 - w0) + bent * (r0 + r2);
+        w0 = w1, r0 = r1, w1 = w2, r1 = r2;
     }
 }
 
-/// Put the loads of the pairs of rows from `low` to `high`, by as many as there is room for sums.
+/// Subtract the products of a row's further entries.
 template <int64_t L>
-[[gnu::always_inline]] inline void load(const ChangedRows& rows, const Motion& motion, int64_t low,
-                                        int64_t high, double* loads) {
-    const int64_t at_a_time = rows.room / 2 - rows.reach, n = size(motion.x);
-    for (int64_t first = low; first < high; first += at_a_time) {
-        const int64_t last = std::min(first + at_a_time, high), from = 2 * first - rows.reach;
-        const int64_t begin = std::max<int64_t>(0, from), end = std::min(2 * last + rows.reach, n);
-        for (int64_t term = 0; term < rows.weights.rows; ++term)
-            add_up<L>(motion, rows.weights[term].data(), begin, end,
-                      rows.sums.data() + L * (rows.room * term + begin - from));
-        multiply<L>(rows, first, last, from, loads);
+[[gnu::always_inline]] inline void multiply_further(const ChangedRows& rows, int64_t row,
+                                                    int64_t kind, const Motion& march,
+                                                    double* loads) {
+    const double *x = march.x.data() + row, *y = march.y.data() + row, *z = march.z.data() + row;
+    typename SideBySide<L>::Numbers sum = SideBySide<L>::at(loads + L * row);
+    for (int64_t k = rows.begin[kind]; k < rows.begin[kind + 1]; ++k) {
+        const int64_t ahead = rows.ahead[k];
+        const double* numbers = rows.further[k].data();
+        sum -= SideBySide<L>::at(numbers) * x[ahead] + SideBySide<L>::at(numbers + L) * y[ahead] +
+               SideBySide<L>::at(numbers + 2 * L) * z[ahead];
     }
+    SideBySide<L>::at(loads + L * row) = sum;
 }
 
 CATENARY_FOR_TARGETS
-void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t low, int64_t high,
+void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t first, int64_t end,
           double* loads) {
     with_lanes(n_lanes, [&](auto n) __attribute__((always_inline)) {
-        load<n>(rows, march, low, high, loads);
+        const Sums<n> sums(rows.weights.data(), march);
+        for (int64_t part = first; part < end; ++part) {
+            for (int64_t r = rows.parts(part, 0); r < rows.parts(part + 1, 0); ++r)
+                multiply<n>(rows.runs[r], rows.numbers[6 * rows.runs(r, 3)].data(), sums, loads);
+            for (int64_t r = rows.parts(part, 1); r < rows.parts(part + 1, 1); ++r)
+                multiply_further<n>(rows, rows.rows(r, 0), rows.rows(r, 1), march, loads);
+        }
     });
 }
 
@@ -104,8 +112,9 @@ void add_answer(const double* forces, std::span<const double> answer, int64_t be
 }  // namespace
 
 void load(const TangentLanes& lanes, const Motion& march) {
-    const int64_t low = lanes.passes->begin() / 2, high = (lanes.passes->end() + 1) / 2;
-    load(lanes.rows, march, lanes.n(), low, high, lanes.loads.data());
+    const int64_t each = 2 * lanes.rows.part;  // unknowns
+    load(lanes.rows, march, lanes.n(), lanes.passes->begin() / each,
+         (lanes.passes->end() + each - 1) / each, lanes.loads.data());
 }
 
 void superpose(const Contacts& contacts, Array2<double> forces, const TangentLanes& lanes) {

@@ -5,23 +5,26 @@
 
 namespace catenary {
 
-/// Derivatives of the line's matrices by the parameters of L lanes, which are multiplied with sums
-/// of the march's x, y and z. A lane has up to n_terms matrices, each with sums by weights of its
-/// own.
+/// Derivatives of the line's matrices by the parameters of L lanes, multiplied with the march's
+/// motion.
 ///
-/// Rows stand in pairs: of rows 2 p and 2 p + 1 the kind. Pairs of a kind have the same numbers,
-/// from begin[kind] to begin[kind + 1]; each is multiplied with the sums that stand `offset`
-/// unknowns behind unknown 2 p, where those of the next term stand `room` behind.
+/// Rows stand in pairs 2 p and 2 p + 1: deflection and rotation of a node. Pairs of a run, nodes
+/// of a wire between equal elements, have six entries, at both unknowns of the pair before, of
+/// their own and of the pair after, which are multiplied with a sum of x, y and z in each lane.
+/// Rows have further entries, each with its own numbers for x, y and z, where droppers hang or
+/// elements differ.
 struct ChangedRows {
-    Array2<const double> weights;  ///< (n_terms, 3 L) of x, y and z
-    std::span<const int32_t> kinds;
-    std::span<const int64_t> begin;
-    std::span<const int32_t> offsets;
-    Array2<const double> values;  ///< (n, 2 L) of the one row in all lanes, then of the other
-    int64_t reach;                ///< how far from unknown 2 p sums are read
-    int64_t room;                 ///< for sums of a term near the pairs that are taken at a time
-    std::span<double> sums;       ///< (n_terms * room * L)
-    CATENARY_RECORD(weights, kinds, begin, offsets, values, reach, room, sums)
+    std::span<const double> weights;  ///< (3 L,) of x, y and z in the sums
+    Array2<const int64_t> parts;      ///< (n_parts + 1, 2) where its `runs` and `rows` begin
+    Array2<const int64_t> runs;       ///< (n, 4) first pair, how many, from one to the next, kind
+    Array2<const double> numbers;     ///< (6 n, L) of kinds of runs, see `multiply`
+    Array2<const int64_t> rows;       ///< (n, 2) with further entries: number and kind
+    std::span<const int64_t> begin;   ///< (n + 1,) of kinds in `ahead` and `further`
+    std::span<const int64_t> ahead;   ///< (n,) from the row to the unknown
+    Array2<const double> further;     ///< (n, 3 L)
+    int64_t part;                     ///< pairs in each part of the line, the last may have fewer
+    CATENARY_RECORD(weights, parts, runs, numbers, rows, begin, ahead, further, part)
+    CATENARY_SHAPES("*, * 2, * 4, * *, * 2, *, k, k *")
 };
 
 /// Motions of the line in L tangents: the numbers of an unknown in all of them follow each other.
