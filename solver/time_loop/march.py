@@ -37,7 +37,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
-from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
+from catenary.solver.schemes.make_scheme import Parts, make_parts
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import (
@@ -119,10 +119,8 @@ class March:
         height = nominal_height_rule(
             self._wire, elasticity, air_speed, problem.contact, with_laws=effects.pantograph_laws
         )
-        self._nominal_height = height
         self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
         self._moving = MovingColumns()
-        self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         # Arrays of a long line are large, so that the first parts take these.
         self._set_up(unchanged(model, form), self._wire)
         self._set_off(model)
@@ -137,7 +135,9 @@ class March:
     def _set_up(self, changed: ChangedLine, wires: ContactWires | None = None) -> None:
         """Make all that steps a line and shows it, from a line that is at rest. Collective."""
         self._changed = changed
-        parts = self._set_ups.make(self._problem, changed, self._pantographs, wires)
+        parts = make_parts(
+            self._comm, self.ownership, self._problem, changed, self._pantographs, wires
+        )
         self._line, self._scheme = parts.line, parts.scheme
         if self._problem.numerics.adaptive_tolerance is not None:
             self._scheme = self._in_levels(changed, parts)
@@ -172,10 +172,9 @@ class March:
             numerics = replace(problem.numerics, dt=problem.numerics.dt / 2**level)
             finer_problem = replace(problem, numerics=numerics)
             laws = self._first.simulated
-            pantographs = Pantographs(
-                self._comm, finer_problem, laws, self._wire, self._nominal_height
-            )
-            return self._set_ups.make(finer_problem, changed, pantographs)
+            height = self._pantographs.nominal_height
+            pantographs = Pantographs(self._comm, finer_problem, laws, self._wire, height)
+            return make_parts(self._comm, self.ownership, finer_problem, changed, pantographs)
 
         return StepLevels(self._comm, problem.numerics, whole, finer)
 
