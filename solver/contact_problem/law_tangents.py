@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
-from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
+from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
@@ -28,7 +28,9 @@ class LawInSteps:
 
     marched: HertzInSteps | None = None
 
-    def __init__(self, n: int, own: float, by_depth: float, by_rate: float, pulls: bool) -> None:
+    def __init__(
+        self, n: int, by_depth: float, by_rate: float, pulls: bool, own: float = 1.0
+    ) -> None:
         self.n = n
         self.tangents = native.Tangents(
             np.full(n, own), np.zeros(n), np.full(n, by_depth), np.full(n, by_rate)
@@ -74,13 +76,6 @@ class LawInSteps:
         """Continue from what ``state`` returned."""
 
 
-class LinearInSteps(LawInSteps):
-    """The linear law."""
-
-    def __init__(self, law: LinearLaw, n: int, pulls: bool) -> None:
-        super().__init__(n, 1.0, law.stiffness, law.damping, pulls)
-
-
 class HertzInSteps(LawInSteps):
     """Hertz's law with hysteresis, which remembers the speed of each contact's last impact.
 
@@ -95,7 +90,7 @@ class HertzInSteps(LawInSteps):
     """
 
     def __init__(self, law: HertzLaw, n: int) -> None:
-        super().__init__(n, 1.0, 0.0, 0.0, pulls=False)
+        super().__init__(n, 0.0, 0.0, pulls=False)
         self.law, self.marched = law, self
         self.speed = np.full(n, law.least_speed)
         self.there = np.zeros(n)
@@ -130,7 +125,7 @@ class KinematicInSteps(LawInSteps):
     """
 
     def __init__(self, n: int, dt: float, gamma: float, from_time: float) -> None:
-        super().__init__(n, 0.0, 1.0, 0.5 * dt, pulls=True)
+        super().__init__(n, 1.0, 0.5 * dt, pulls=True, own=0.0)
         self._gamma = gamma
         self._from_time = from_time
         self._force = np.zeros(n)
@@ -173,4 +168,4 @@ def law_in_steps(problem: Problem, simulated: Simulated, n: int) -> LawInSteps:
         return KinematicInSteps(n, numerics.dt, numerics.gamma, problem.train.raise_time)
     if isinstance(law, HertzLaw):
         return HertzInSteps(law, n)
-    return LinearInSteps(law, n, pulls=not simulated.contact_loss)
+    return LawInSteps(n, law.stiffness, law.damping, pulls=not simulated.contact_loss)

@@ -230,7 +230,9 @@ class LineIntegrator(ABC):
         """Take steps of the stations in a window only from now on. One rank, in two passes."""
         assert self.passes is not None
         self.window = window
-        self.passes.open(window.arrays, *self._links)
+        arrays, steps = window.arrays, self.passes.native
+        steps.open(arrays)
+        steps.track(native.TrackedLinks(*self._links, arrays.ranges, arrays.low.size))
 
     def provide(self, way: float) -> None:
         """Have what steps need until contacts are a ``way`` [m] further. Not collective."""

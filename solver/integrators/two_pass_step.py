@@ -51,10 +51,11 @@ class StationPasses:
         motion: PredictedLineState,
     ) -> None:
         product, factors, read, velocity, answer, by_mass = parts
-        _, _, low, high, _ = factors.ends.tolist()
+        _, _, low, high, _ = factors.arrays.ends.tolist()
         self.factors = factors
         self.known = motion.known
-        self._starts = factors.starts[low : high + 1] - factors.starts[low]
+        starts = factors.stations.starts
+        self._starts = starts[low : high + 1] - starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
         pairs = zip(product.layout.parts, factors.layout.parts, strict=True)
         layouts = [(rows.native, columns.native) for rows, columns in pairs]
@@ -113,9 +114,3 @@ class StationPasses:
             answer=answer,
             motion=motion,
         )
-
-    def open(self, window: native.Window, links: native.Links, reserve: np.ndarray) -> None:
-        """Step only the stations in ``window`` from now on; ``links`` and ``reserve`` as in
-        ``track_links``."""
-        self.native.open(window)
-        self.native.track(native.TrackedLinks(links, reserve, window.ranges, window.low.size))

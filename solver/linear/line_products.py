@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -143,7 +144,7 @@ class LineProducts:
             return None
         rows = rows._replace(blocks=-mass / stiffness * rows.blocks)
         pairs = of_pairs(self.layout.pitch)
-        layout = joining(self.layout.changed(own=pairs, beside=pairs), rows.blocks)
+        layout = joining(replace(self.layout, own=pairs, beside=pairs), rows.blocks)
         found, of_stiffness = layout.native, self.layout.native
         if found.n_products + FEWER * found.n_vectors > of_stiffness.n_products:
             return None

@@ -35,7 +35,6 @@ class MovingWindow:
     Attributes
     ----------
     arrays : ``native.Window``
-    unknowns : first unknown that moves and the one after the last, as of the latest look
 
     Parameters
     ----------
@@ -92,8 +91,8 @@ class MovingWindow:
             high=np.ascontiguousarray(numbering.high),
             starts=starts,
             links_before=before.astype(np.int64),
-            ends=factors.ends,
-            kinds=factors.kinds,
+            ends=factors.arrays.ends,
+            kinds=factors.arrays.kinds,
             turning=factors.turning,
             links=moving_links,
             ranges=np.zeros((2, 2), dtype=np.int64),
@@ -179,20 +178,10 @@ class MovingWindow:
         self._covered = self._operators.pieces.cover(begin, end)
 
     @property
-    def unknowns(self) -> tuple[int, int]:
-        begin, end = self.arrays.ends[2:4]
-        return int(self.arrays.starts[begin]), int(self.arrays.starts[end])
-
-    @property
     def stations(self) -> tuple[np.ndarray, np.ndarray]:
         """The first station that moves and the one after the last, kept up to date, and first
         unknowns (n + 1,) of all stations."""
         return self.arrays.ends, self.arrays.starts
-
-    @property
-    def n_stations(self) -> int:
-        """Number of moving stations."""
-        return int(self.arrays.ends[3] - self.arrays.ends[2])
 
     def state(self) -> np.ndarray:
         """Steps taken, range of stations and largest motion, as numbers to go on from."""
@@ -203,19 +192,15 @@ class MovingWindow:
         """Open the window to all stations until the next look, as after a change of the motion."""
         arrays = self.arrays
         arrays.state[:] = 0, 1
-        self._open(0, arrays.low.size)
+        native.turn_to(arrays, 0, arrays.low.size)
 
     def restore(self, state: np.ndarray) -> None:
         """Go on from a ``state``."""
         arrays = self.arrays
         step, is_fresh, begin, end = state[:4].astype(np.int64).tolist()
         arrays.state[STEP], arrays.state[IS_FRESH] = step, is_fresh
-        self._open(begin, end)
+        native.turn_to(arrays, begin, end)
         arrays.peak[:] = state[4:6]
-
-    def _open(self, begin: int, end: int) -> None:
-        """Set the window to stations from ``begin`` to ``end``; the motion stays as it is."""
-        native.turn_to(self.arrays, begin, end)
 
 
 def wanted_pieces(problem: Problem, model: Model, contacts: np.ndarray) -> WantedPieces | None:
