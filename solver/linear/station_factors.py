@@ -212,7 +212,8 @@ class FoundFactors(NamedTuple):
         )
         here = np.zeros((len(triples), *before.shape[1:]))
         meetings = np.ascontiguousarray(triples).view(native.MEETING)[:, 0]
-        native.join(meetings, matrix, before, behind, here)
+        by_part = (own.reshape(-1, *own.shape[2:]) for own in (before, behind, here))
+        native.join(meetings, matrix, *by_part)
         n_before, n_behind = len(before), len(behind)
         parts = [at_before, n_before + at_behind, n_before + n_behind + at_middle.ravel()]
         numbers = np.concatenate(parts if middle is None else [parts[0], parts[2], parts[1]])
