@@ -36,6 +36,7 @@ class LawInSteps:
             np.full(n, own), np.zeros(n), np.full(n, by_depth), np.full(n, by_rate)
         )
         self.pulls = pulls
+        self._memory = np.zeros(0)
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law itself without the cut at zero (n,) [N]."""
@@ -70,10 +71,11 @@ class LawInSteps:
 
     def state(self) -> np.ndarray:
         """Memory of the law, as one array."""
-        return np.zeros(0)
+        return self._memory.copy()
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
+        self._memory[:] = state
 
 
 class HertzInSteps(LawInSteps):
@@ -92,27 +94,17 @@ class HertzInSteps(LawInSteps):
     def __init__(self, law: HertzLaw, n: int) -> None:
         super().__init__(n, 0.0, 0.0, pulls=False)
         self.law, self.marched = law, self
-        self.speed = np.full(n, law.least_speed)
+        self.speed = self._memory = np.full(n, law.least_speed)
         self.there = np.zeros(n)
         self._linearise = native.linearise.bound(self)
         self._remember = native.remember.bound(self)
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """The law (n,) [N]."""
         self._linearise(depth, rate)
         return self.there
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
-        """Store the approach speed of open contacts."""
         self._remember(depth, rate)
-
-    def state(self) -> np.ndarray:
-        """Speeds of impact of touching contacts, or of the next impact."""
-        return self.speed.copy()
-
-    def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
-        self.speed[:] = state
 
 
 class KinematicInSteps(LawInSteps):
@@ -128,7 +120,7 @@ class KinematicInSteps(LawInSteps):
         super().__init__(n, 1.0, 0.5 * dt, pulls=True, own=0.0)
         self._gamma = gamma
         self._from_time = from_time
-        self._force = np.zeros(n)
+        self._force = self._memory = np.zeros(n)
         self._mean = np.zeros(n)
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
@@ -144,21 +136,12 @@ class KinematicInSteps(LawInSteps):
             )
 
     def reported(self, force: np.ndarray) -> np.ndarray:
-        """The mean over the step."""
         return self._mean
 
     def in_loop(self) -> native.StepLaw:
         """Means over the steps; none may pull once the pantographs are raised."""
         reported = native.ReportedForces(self._gamma, self._from_time, self._force, self._mean)
         return native.StepLaw(None, reported)
-
-    def state(self) -> np.ndarray:
-        """The latest force itself."""
-        return self._force.copy()
-
-    def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
-        self._force[:] = state
 
 
 def law_in_steps(problem: Problem, simulated: Simulated, n: int) -> LawInSteps:

@@ -51,7 +51,7 @@ class LineIntegrator(ABC):
     responses : UnitResponses of the step operator
     loads : LineLoads, None if there are none
     passes : free steps in compiled code, None if these are taken in parts
-    solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
+    solution : a PETSc vector for the displacement
     slow_path : why ``keep_ahead`` could not, None if it could; the same on all ranks
     window : MovingWindow, None if all stations move
 
@@ -295,10 +295,6 @@ class LineIntegrator(ABC):
             self.velocity_factor,
             self._beta_share,
         )
-
-    def fill_solution(self) -> None:
-        """Make ``solution`` the present displacement. Not collective."""
-        self.solution.setArray(self.displacement)
 
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""

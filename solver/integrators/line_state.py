@@ -135,7 +135,6 @@ class PredictedLineState(LineState):
         return velocity
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
-        """Take displacement [m], velocity [m/s] and acceleration [m/s2], (n_local,) each."""
         x, y, z = self.read[:3]
         x[:], y[:], z[:] = self.ahead(displacement, velocity, acceleration)
 
@@ -149,7 +148,6 @@ class PredictedLineState(LineState):
         return -(predicted + c_work * y), y, acceleration
 
     def carried(self) -> Mapping[str, np.ndarray]:
-        """The predictions, by name: the arrays themselves."""
         return {"ahead": self.read[0], "velocity_ahead": self.read[1]}
 
     def take(self, state: Mapping[str, np.ndarray]) -> None:
@@ -210,7 +208,6 @@ class AlphaAhead(PredictedLineState):
         self._shown, self.known, self.predicted = shown, known, predicted
 
     def changes(self, by_mass: float) -> native.Changes:
-        """Coefficients from one prediction to the next; ``by_mass`` as there."""
         of_balanced, of_known = self.balance
         by_position, by_velocity, _ = map(float, self.gains)
 

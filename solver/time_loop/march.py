@@ -273,9 +273,12 @@ class March:
         since = first
         ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
         ends = [*(happened.step for happened in ahead), self.n_steps]
+
         # PETSc's monitors of the solution look at each.
-        fill = (lambda: self._line.fill_solution()) if wants_solution() else None
-        observer_list = ObserverList(observers, fill)
+        def fill() -> None:
+            self._line.solution.setArray(self._line.displacement)
+
+        observer_list = ObserverList(observers, fill if wants_solution() else None)
         ts = self._make_ts(observer_list, stop_requested, first, ends[0])
         try:
             observer_list.start(self._showing.stage(dt, first * dt, self.n_steps))

@@ -126,8 +126,7 @@ class MovingWindow:
         begin, end = max(0, min(begin, end - LEAST)), min(n, max(end, begin + LEAST))
         if not arrays.state[IS_FRESH]:
             begin, end = min(begin, int(arrays.ends[2])), max(end, int(arrays.ends[3]))
-        if not self._is_covered(begin - _AROUND, end + _AROUND):
-            self._have(max(0, begin - _AROUND), min(n, end + _AROUND))
+        self.provide_rows(max(0, begin - _AROUND), min(n, end + _AROUND))
 
     def _spans_around(self, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
         """Ends of a window of spans around contacts from ``first`` to ``last`` [m]: as numbers of
@@ -153,12 +152,13 @@ class MovingWindow:
 
     def provide_rows(self, begin: int, end: int) -> None:
         """Have products with the rows of stations from ``begin`` to before ``end``."""
-        if not self.has_rows(begin, end):
-            self._have(begin, end)
+        if self._operators is not None and not self.has_rows(begin, end):
+            self._covered = self._operators.pieces.cover(begin, end)
 
     def has_rows(self, begin: int, end: int) -> bool:
         """Whether there are products with these rows."""
-        return self._operators is None or self._is_covered(begin, end)
+        first, last = self._covered
+        return self._operators is None or (first <= begin and end <= last)
 
     @property
     def most_rows(self) -> int:
@@ -167,15 +167,6 @@ class MovingWindow:
             return int(self.arrays.low.size)
         pieces = self._operators.pieces
         return pieces.size * (pieces.n_slots - 1)
-
-    def _is_covered(self, begin: int, end: int) -> bool:
-        n = self.arrays.low.size
-        return self._covered[0] <= max(0, begin) and min(n, end) <= self._covered[1]
-
-    def _have(self, begin: int, end: int) -> None:
-        """Have pieces with the stations from ``begin`` to before ``end``."""
-        assert self._operators is not None
-        self._covered = self._operators.pieces.cover(begin, end)
 
     @property
     def stations(self) -> tuple[np.ndarray, np.ndarray]:

@@ -19,11 +19,7 @@ from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.coupling import Explicit
-from catenary.solver.contact_problem.law_tangents import (
-    HertzInSteps,
-    KinematicInSteps,
-    LawInSteps,
-)
+from catenary.solver.contact_problem.law_tangents import HertzInSteps, KinematicInSteps, LawInSteps
 from catenary.solver.problem.contact_laws import HertzLaw
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
