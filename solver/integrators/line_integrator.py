@@ -98,7 +98,7 @@ class LineIntegrator(ABC):
             self._alpha_share = alpha - self._beta_share * stiffness_share
             self._shares = 1.0 + self.velocity_factor * beta_damping, stiffness_share
         n = ownership.n_local
-        gains = self.position_factor, self.velocity_factor
+        gains = self.position_factor, self.velocity_factor, 1.0
         self.passes: StationPasses | None = None
         self.loads: LineLoads | None = None
         if model.loads:

@@ -157,11 +157,9 @@ def packed_factors(
 
     ``station_type`` (m,) is that of each factor.
     """
-
-    def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
-        return packed_blocks(part, found.factors[rows])
-
-    return kinds_by_type(layout, station_type, pack)[:2]
+    return kinds_by_type(
+        layout, station_type, lambda part, rows: packed_blocks(part, found.factors[rows])
+    )[:2]
 
 
 def besides_of(
