@@ -14,7 +14,6 @@ import gc
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -89,6 +88,10 @@ class March:
 
     A context manager that destroys itself.
 
+    Attributes
+    ----------
+    first_step : number of the step that it goes on from
+
     Parameters
     ----------
     comm : mpi4py communicator
@@ -126,7 +129,7 @@ class March:
         self._set_off(model)
         self._showing.cross(0.0)
         give_back(model.n_unknowns)
-        self._first_step = 0
+        self.first_step = 0
         self._happened: tuple[LineIncident, ...] = ()
         self._ahead = self._happening()
         if self.slow_path is not None and comm.rank == 0:
@@ -233,21 +236,21 @@ class March:
         InputError
             On all ranks, if it is not one of this line, or beyond the end of the run.
         """
-        self._first_step = int(checkpoint["step"])
-        if not 0 <= self._first_step <= self.n_steps:
+        self.first_step = int(checkpoint["step"])
+        if not 0 <= self.first_step <= self.n_steps:
             raise InputError(
-                f"the state to continue from is of step {self._first_step}, and the run has "
+                f"the state to continue from is of step {self.first_step}, and the run has "
                 f"{self.n_steps}; start the run anew"
             )
         happening = self._happening()
-        past = [happened for happened in happening if happened.step < self._first_step]
+        past = [happened for happened in happening if happened.step < self.first_step]
         incidents = past[-1].incidents if past else ()
         if incidents != self._happened:
             self.destroy()
             changed = changed_line(self._first, self._form, incidents)
             self._set_up(changed if incidents else unchanged(self._first, self._form))
         self._happened, self._ahead = incidents, happening[len(past) :]
-        time = self._first_step * self._problem.numerics.dt
+        time = self.first_step * self._problem.numerics.dt
         self._pantographs.move_to(time)
         self._showing.checkpoints.restore(checkpoint)
         self._showing.cross(time, found=True)
@@ -269,7 +272,7 @@ class March:
         RunBroken
             If an observer cannot start.
         """
-        dt, first = self._problem.numerics.dt, self._first_step
+        dt, first = self._problem.numerics.dt, self.first_step
         since = first
         ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
         ends = [*(happened.step for happened in ahead), self.n_steps]
@@ -330,29 +333,6 @@ class March:
             "" if self.slow_path is None else str(self.slow_path),
             finishing,
         )
-
-    def write_line(self, path: Path, most_speed: float) -> int:
-        """Write a line that is stepped from outside, see `prepared_line`; for how many steps.
-
-        Its train can be given speeds below ``most_speed`` [m/s]. Not collective; one rank only.
-
-        Raises
-        ------
-        InputError
-            If steps of the scene need more than the compiled loop.
-        RunBroken
-            If the file cannot be written.
-        """
-        from catenary.solver.time_loop.prepared_line import write_line
-
-        scheme, showing, dt = self.in_loop()
-        blocks = compiled_steps(scheme, showing, dt, shows=False)
-        assert blocks is not None
-        numbering = self._changed.model.numbering
-        turns = numbering.numbers[:, [name.startswith("theta") for name in numbering.names]]
-        steps = self._first_step, self.n_steps
-        write_line(path, blocks, dt, steps, turns[turns >= 0], most_speed)
-        return self.n_steps - self._first_step
 
     def in_loop(self) -> tuple[OneSolve, Showing, float]:
         """Scheme, shown channels and time step [s] of a march that one compiled loop takes
