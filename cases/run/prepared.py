@@ -15,6 +15,7 @@ from catenary.solver.problem.problem import slowest_wave_speed
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.statics.stability_of_rest import refuse_lost_wire
 from catenary.solver.time_loop.march import March
+from catenary.solver.time_loop.prepared_line import write_line
 
 _KERNELS = Path(catenary.solver.kernels.__path__[0])
 # Header and library of C programs.
@@ -47,4 +48,4 @@ def prepare_line(scene: Scene, path: Path) -> int:
     slower = scene.holds(Limit.WAVE_SPEED)
     below = slowest_wave_speed(at_rest.problem) if slower else inf
     with March(MPI.COMM_SELF, *at_rest) as march:
-        return march.write_line(path, below)
+        return write_line(march, path, below)

@@ -106,6 +106,7 @@ class Pantographs:
     lateral_displacement : the last of ``across``
     outputs : ``position`` and all these of the latest step one after another
     speed : of the train [m/s]
+    nominal_height : head height at which the static force of a placement is defined [m]
     places_along : ``native.TrainPlaces``
     along_track : whether a base or the air at a pantograph depends on its place, rank 0
     reach : how far contacts are behind and ahead of their pantographs at most [m], all ranks
@@ -129,7 +130,7 @@ class Pantographs:
         train = problem.train
         self._wires = wires
         self._start = np.array([train.start - p.behind for p in train.placements])
-        self.speed = train.speed
+        self.speed, self.nominal_height = train.speed, nominal_height
         offsets = [placement.data.strips.offsets for placement in train.placements]
         counts, n_wires = [len(own) for own in offsets], wires.n_wires
         of_strip, of_pantograph = np.arange(sum(counts) + 1), np.cumsum([0, *counts])

@@ -85,7 +85,6 @@ class Implicit(Coupling):
     """Linearly implicit through both compliances, stable for every stiffness and mass."""
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
-        """Forces of the law at the end of the step."""
         return self.inner.solve(line, heads)
 
 
@@ -99,7 +98,6 @@ class Explicit(Coupling):
     extrapolates = True
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
-        """Forces of the law at the extrapolation."""
         depth = heads.early_height - line.early_height
         depth[line.present == 0.0] = native.NOWHERE
         force = self._applied(self.law.force(depth, heads.early_velocity - line.early_rate), line)
@@ -129,13 +127,11 @@ class Iterated(Coupling):
         return np.concatenate([self._latest, super().state()])
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         n = self._latest.size
         self._latest = state[:n].copy()
         super().restore(state[n:])
 
     def solve(self, line: LineResponse, heads: Heads) -> InnerSolution:
-        """Forces after as many exchanges as they need."""
         inner, force = self.inner, self._latest
         inner.take(line, heads)
         inner.pivoted = False

@@ -10,7 +10,7 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
-from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
+from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.simulated import Simulated
 
@@ -28,12 +28,15 @@ class LawInSteps:
 
     marched: HertzInSteps | None = None
 
-    def __init__(self, n: int, own: float, by_depth: float, by_rate: float, pulls: bool) -> None:
+    def __init__(
+        self, n: int, by_depth: float, by_rate: float, pulls: bool, own: float = 1.0
+    ) -> None:
         self.n = n
         self.tangents = native.Tangents(
             np.full(n, own), np.zeros(n), np.full(n, by_depth), np.full(n, by_rate)
         )
         self.pulls = pulls
+        self._memory = np.zeros(0)
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """The law itself without the cut at zero (n,) [N]."""
@@ -68,17 +71,11 @@ class LawInSteps:
 
     def state(self) -> np.ndarray:
         """Memory of the law, as one array."""
-        return np.zeros(0)
+        return self._memory.copy()
 
     def restore(self, state: np.ndarray) -> None:
         """Continue from what ``state`` returned."""
-
-
-class LinearInSteps(LawInSteps):
-    """The linear law."""
-
-    def __init__(self, law: LinearLaw, n: int, pulls: bool) -> None:
-        super().__init__(n, 1.0, law.stiffness, law.damping, pulls)
+        self._memory[:] = state
 
 
 class HertzInSteps(LawInSteps):
@@ -95,29 +92,19 @@ class HertzInSteps(LawInSteps):
     """
 
     def __init__(self, law: HertzLaw, n: int) -> None:
-        super().__init__(n, 1.0, 0.0, 0.0, pulls=False)
+        super().__init__(n, 0.0, 0.0, pulls=False)
         self.law, self.marched = law, self
-        self.speed = np.full(n, law.least_speed)
+        self.speed = self._memory = np.full(n, law.least_speed)
         self.there = np.zeros(n)
         self._linearise = native.linearise.bound(self)
         self._remember = native.remember.bound(self)
 
     def force(self, depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """The law (n,) [N]."""
         self._linearise(depth, rate)
         return self.there
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
-        """Store the approach speed of open contacts."""
         self._remember(depth, rate)
-
-    def state(self) -> np.ndarray:
-        """Speeds of impact of touching contacts, or of the next impact."""
-        return self.speed.copy()
-
-    def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
-        self.speed[:] = state
 
 
 class KinematicInSteps(LawInSteps):
@@ -130,10 +117,10 @@ class KinematicInSteps(LawInSteps):
     """
 
     def __init__(self, n: int, dt: float, gamma: float, from_time: float) -> None:
-        super().__init__(n, 0.0, 1.0, 0.5 * dt, pulls=True)
+        super().__init__(n, 1.0, 0.5 * dt, pulls=True, own=0.0)
         self._gamma = gamma
         self._from_time = from_time
-        self._force = np.zeros(n)
+        self._force = self._memory = np.zeros(n)
         self._mean = np.zeros(n)
 
     def accept(self, time: float, depth: np.ndarray, rate: np.ndarray, force: np.ndarray) -> None:
@@ -149,21 +136,12 @@ class KinematicInSteps(LawInSteps):
             )
 
     def reported(self, force: np.ndarray) -> np.ndarray:
-        """The mean over the step."""
         return self._mean
 
     def in_loop(self) -> native.StepLaw:
         """Means over the steps; none may pull once the pantographs are raised."""
         reported = native.ReportedForces(self._gamma, self._from_time, self._force, self._mean)
         return native.StepLaw(None, reported)
-
-    def state(self) -> np.ndarray:
-        """The latest force itself."""
-        return self._force.copy()
-
-    def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
-        self._force[:] = state
 
 
 def law_in_steps(problem: Problem, simulated: Simulated, n: int) -> LawInSteps:
@@ -173,4 +151,4 @@ def law_in_steps(problem: Problem, simulated: Simulated, n: int) -> LawInSteps:
         return KinematicInSteps(n, numerics.dt, numerics.gamma, problem.train.raise_time)
     if isinstance(law, HertzLaw):
         return HertzInSteps(law, n)
-    return LinearInSteps(law, n, pulls=not simulated.contact_loss)
+    return LawInSteps(n, law.stiffness, law.damping, pulls=not simulated.contact_loss)

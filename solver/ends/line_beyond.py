@@ -86,11 +86,11 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
         start = begins[0] if side == END else begins[1]
         whole = _matrices(model, start, start + size, start, start + 2 * size)
         joins = np.flatnonzero(whole[:, :, size:].any(axis=(0, 1)))
-        own, joined = _without(whole, start, held, (size, 2 * size))
+        own, joined = _without(whole, start, held)
         shared = np.flatnonzero(joined.any(axis=(0, 1)))
         other = begins[1] if side == END else begins[0]
         beside = _matrices(model, other, other + size, other, other + size)
-        beside, _ = _without(beside, other, held, (size, size))
+        beside, _ = _without(beside, other, held)
         signs = sideways(model, start + np.arange(size))
         if _mirrored(own, beside, joins, signs, model.simulated.wind is not None):
             # Counted from the end of the model, every second cross-section is the other way round.
@@ -142,12 +142,10 @@ def shared_at(model: Model, unknowns: np.ndarray) -> np.ndarray:
     return _matrices(model, low, high, low, high)[:, at][:, :, at]
 
 
-def _without(
-    whole: np.ndarray, first: int, held: np.ndarray, sizes: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray]:
+def _without(whole: np.ndarray, first: int, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Matrices of unknowns from ``first`` on without held ones, whose rows and columns are empty:
-    those of the span itself, and what joins it with the next one, if ``sizes`` has that."""
-    size, n = sizes
+    those of the span itself, and what joins it with the next one, if ``whole`` has that."""
+    _, size, n = whole.shape
     free = ~np.isin(first + np.arange(n), held)
     whole = whole * free[:size, None] * free
     return whole[:, :, :size], whole[:, :, size:]

@@ -194,8 +194,8 @@ class SharedLine:
         )
         arrays = passes.arrays_in_lanes(n_lanes)
         x, y, z, *same = arrays.motion
-        own = (native.Motion(x[k:], y[k:], z[k:], *same) for k in lanes)
-        motions = [LineState.of(motion, self.line.motion.gains) for motion in own]
+        gains = self.line.motion.gains
+        motions = [LineState(x[k:], y[k:], z[k:], gains, *same) for k in lanes]
         self.lanes = [Lane(*own) for own in zip(lanes, motions, links, strict=True)]
         _, droppers, _ = links[0].shown(DROPPERS)
         n, arms = droppers.law.size, model.dofs(model.mesh.steady_arms).astype(np.int64)

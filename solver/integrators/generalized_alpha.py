@@ -106,10 +106,8 @@ class GeneralizedAlphaLine(LineIntegrator):
         return {**super()._parts_of_state(), "known_acceleration": partial(np.asarray, self._known)}
 
     def kept(self) -> tuple[np.ndarray, ...]:
-        """The arrays themselves that a step changes."""
         return *super().kept(), self._known
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Continue from what ``state`` returned, here or elsewhere."""
         self._known[:] = state["known_acceleration"]
         super().restore(state)

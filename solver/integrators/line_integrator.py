@@ -51,7 +51,7 @@ class LineIntegrator(ABC):
     responses : UnitResponses of the step operator
     loads : LineLoads, None if there are none
     passes : free steps in compiled code, None if these are taken in parts
-    solution : the displacement as a PETSc vector, once ``fill_solution`` has filled it
+    solution : a PETSc vector for the displacement
     slow_path : why ``keep_ahead`` could not, None if it could; the same on all ranks
     window : MovingWindow, None if all stations move
 
@@ -98,7 +98,7 @@ class LineIntegrator(ABC):
             self._alpha_share = alpha - self._beta_share * stiffness_share
             self._shares = 1.0 + self.velocity_factor * beta_damping, stiffness_share
         n = ownership.n_local
-        gains = self.position_factor, self.velocity_factor
+        gains = self.position_factor, self.velocity_factor, 1.0
         self.passes: StationPasses | None = None
         self.loads: LineLoads | None = None
         if model.loads:
@@ -230,7 +230,9 @@ class LineIntegrator(ABC):
         """Take steps of the stations in a window only from now on. One rank, in two passes."""
         assert self.passes is not None
         self.window = window
-        self.passes.open(window.arrays, *self._links)
+        arrays, steps = window.arrays, self.passes.native
+        steps.open(arrays)
+        steps.track(native.TrackedLinks(*self._links, arrays.ranges, arrays.low.size))
 
     def provide(self, way: float) -> None:
         """Have what steps need until contacts are a ``way`` [m] further. Not collective."""
@@ -293,10 +295,6 @@ class LineIntegrator(ABC):
             self.velocity_factor,
             self._beta_share,
         )
-
-    def fill_solution(self) -> None:
-        """Make ``solution`` the present displacement. Not collective."""
-        self.solution.setArray(self.displacement)
 
     def energies(self) -> tuple[float, float]:
         """Kinetic and elastic energy relative to equilibrium, all droppers taut [J]. Collective."""

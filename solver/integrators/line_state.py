@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catenary.solver.kernels import native
 from catenary.solver.kernels.native import Alpha, Motion, Newmark
@@ -27,8 +28,9 @@ class LineState:
 
     Parameters
     ----------
-    displacement, velocity, acceleration : arrays (n_local,) that it keeps its state in
-    gains : [s2], [s]
+    displacement, velocity, acceleration : arrays (n_local,) for x, y and z
+    gains : [s2], [s], [-]
+    shares, spacing : of ``native.Motion``
     """
 
     def __init__(
@@ -36,18 +38,12 @@ class LineState:
         displacement: np.ndarray,
         velocity: np.ndarray,
         acceleration: np.ndarray,
-        gains: tuple[float, float],
+        gains: ArrayLike,
+        shares: ArrayLike = (1.0, 0.0, 0.0, 1.0, 0.0),
+        spacing: int = 1,
     ) -> None:
-        shares = np.array([1.0, 0.0, 0.0, 1.0, 0.0])
-        self.read = Motion(displacement, velocity, acceleration, shares, 1)
-        self.gains = np.array([*gains, 1.0])
-
-    @classmethod
-    def of(cls, read: Motion, gains: np.ndarray) -> LineState:
-        """A state that kernels read and change; Python shows none of it."""
-        state = cls.__new__(cls)
-        state.read, state.gains = read, gains
-        return state
+        self.read = Motion(displacement, velocity, acceleration, np.array(shares), spacing)
+        self.gains = np.array(gains)
 
     @property
     def displacement(self) -> np.ndarray:
@@ -109,9 +105,9 @@ class PredictedLineState(LineState):
         dt, c_position, c_velocity, c_work, position_factor, velocity_factor, _ = steps
         by_velocity = velocity_factor + c_velocity
         by_position = position_factor + dt * velocity_factor + c_position + c_work * by_velocity
-        super().__init__(ahead, velocity, acceleration, (-by_position, by_velocity))
-        shares = [-1.0, -(c_work + dt), dt * c_velocity - c_position, 1.0, -c_velocity]
-        self.read[3][:] = shares
+        shares = -1.0, -(c_work + dt), dt * c_velocity - c_position, 1.0, -c_velocity
+        gains = -by_position, by_velocity, 1.0
+        super().__init__(ahead, velocity, acceleration, gains, shares)
         self._steps, self._shown = steps, shown
 
     def changes(self, by_mass: float) -> native.Changes:
@@ -135,7 +131,6 @@ class PredictedLineState(LineState):
         return velocity
 
     def put(self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
-        """Take displacement [m], velocity [m/s] and acceleration [m/s2], (n_local,) each."""
         x, y, z = self.read[:3]
         x[:], y[:], z[:] = self.ahead(displacement, velocity, acceleration)
 
@@ -149,7 +144,6 @@ class PredictedLineState(LineState):
         return -(predicted + c_work * y), y, acceleration
 
     def carried(self) -> Mapping[str, np.ndarray]:
-        """The predictions, by name: the arrays themselves."""
         return {"ahead": self.read[0], "velocity_ahead": self.read[1]}
 
     def take(self, state: Mapping[str, np.ndarray]) -> None:
@@ -204,13 +198,12 @@ class AlphaAhead(PredictedLineState):
         self._by_velocity, self._dt, self._damping_share = speed, by.dt, damping_share
         self._way = by.dt + work
         by_position = factors[0] + self._way * factors[1] + self.balance[0]
-        LineState.__init__(self, ahead, velocity, balance, (-by_position, factors[1]))
-        self.gains[2] = self.balance[0]
-        self.read[3][:] = [-1.0, -self._way, -1.0, 1.0, 0.0]
+        gains = -by_position, factors[1], self.balance[0]
+        arrays = ahead, velocity, balance
+        LineState.__init__(self, *arrays, gains, (-1.0, -self._way, -1.0, 1.0, 0.0))
         self._shown, self.known, self.predicted = shown, known, predicted
 
     def changes(self, by_mass: float) -> native.Changes:
-        """Coefficients from one prediction to the next; ``by_mass`` as there."""
         of_balanced, of_known = self.balance
         by_position, by_velocity, _ = map(float, self.gains)
 

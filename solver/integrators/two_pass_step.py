@@ -51,10 +51,11 @@ class StationPasses:
         motion: PredictedLineState,
     ) -> None:
         product, factors, read, velocity, answer, by_mass = parts
-        _, _, low, high, _ = factors.ends.tolist()
+        _, _, low, high, _ = factors.arrays.ends.tolist()
         self.factors = factors
         self.known = motion.known
-        self._starts = factors.starts[low : high + 1] - factors.starts[low]
+        starts = factors.stations.starts
+        self._starts = starts[low : high + 1] - starts[low]
         self._stretch = max(1, _STRETCH * (high - low) // max(1, int(self._starts[-1])))
         pairs = zip(product.layout.parts, factors.layout.parts, strict=True)
         layouts = [(rows.native, columns.native) for rows, columns in pairs]
@@ -76,10 +77,25 @@ class StationPasses:
 
     def tracked(self, links: native.Links, reserve: np.ndarray) -> native.TrackedLinks:
         """Arguments of the kernels for ``track_links``."""
-        n_pairs = max(0, self._starts.size - 2) // 2
-        n_stretches = -(-n_pairs // self._stretch)
-        ranges = np.zeros((1 + max(1, n_stretches), 2), dtype=np.int64)
-        native.left_behind(self._starts, self._stretch, links.unknowns, ranges)
+        starts, n = self._starts, self._starts.size - 1
+        middle, n_pairs = n // 2, (n - 1) // 2
+        n_stretches = max(1, -(-n_pairs // self._stretch))
+        # Unknowns that are solved for after each stretch; the last one is all that is left.
+        reach = np.minimum(self._stretch * np.arange(1, n_stretches + 1), n_pairs)
+        begin, end = starts[middle - reach], starts[middle + reach + 1]
+        begin[-1], end[-1] = 0, starts[-1]
+        low, high = links.unknowns.min(axis=1), links.unknowns.max(axis=1)
+        first = int(np.append(links.unknowns[:, 0] >= starts[middle], True).argmax())
+
+        def counts(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+            """How many links, one after the other outwards, are left behind with each stretch."""
+            least, most = np.minimum.accumulate(low), np.maximum.accumulate(high)
+            inside = np.searchsorted(-least, -begin, side="right"), np.searchsorted(most, end)
+            return np.minimum(*inside)
+
+        ranges = np.full((1 + n_stretches, 2), first)
+        ranges[1:, 0] -= counts(low[:first][::-1], high[:first][::-1])
+        ranges[1:, 1] += counts(low[first:], high[first:])
         return native.TrackedLinks(links, reserve, ranges, self._stretch)
 
     @property
@@ -113,9 +129,3 @@ class StationPasses:
             answer=answer,
             motion=motion,
         )
-
-    def open(self, window: native.Window, links: native.Links, reserve: np.ndarray) -> None:
-        """Step only the stations in ``window`` from now on; ``links`` and ``reserve`` as in
-        ``track_links``."""
-        self.native.open(window)
-        self.native.track(native.TrackedLinks(links, reserve, window.ranges, window.low.size))

@@ -38,7 +38,9 @@ def reach(model: Model, bands: OperatorBands) -> float:
     positions = np.sort(model.mesh.points[:, 0])
     total = float(positions[-1] - positions[0])
     furthest = 0.0
-    for place, loads in (_in_the_middle(positions), _around_the_longest(positions)):
+    middle = 0.5 * float(positions[0] + positions[-1])
+    in_the_middle = middle, positions[[np.argmin(np.abs(positions - middle))]]
+    for place, loads in (in_the_middle, _around_the_longest(positions)):
         window = _WINDOW
         found, seen = _reach_of(loads, place, model, bands, positions, window)
         while found > _SEEN * seen:
@@ -48,12 +50,6 @@ def reach(model: Model, bands: OperatorBands) -> float:
             found, seen = _reach_of(loads, place, model, bands, positions, window)
         furthest = max(furthest, found)
     return min(total, _MARGIN * furthest)
-
-
-def _in_the_middle(positions: np.ndarray) -> tuple[float, np.ndarray]:
-    """The middle of the line [m] and the station there."""
-    middle = 0.5 * float(positions[0] + positions[-1])
-    return middle, positions[[np.argmin(np.abs(positions - middle))]]
 
 
 def _around_the_longest(positions: np.ndarray) -> tuple[float, np.ndarray]:

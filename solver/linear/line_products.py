@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -143,7 +144,7 @@ class LineProducts:
             return None
         rows = rows._replace(blocks=-mass / stiffness * rows.blocks)
         pairs = of_pairs(self.layout.pitch)
-        layout = joining(self.layout.changed(own=pairs, beside=pairs), rows.blocks)
+        layout = joining(replace(self.layout, own=pairs, beside=pairs), rows.blocks)
         found, of_stiffness = layout.native, self.layout.native
         if found.n_products + FEWER * found.n_vectors > of_stiffness.n_products:
             return None
@@ -158,7 +159,7 @@ class LineProducts:
         """
         domain = self._domain
         rows = self._sections(domain.low, domain.high)
-        operator = self._like_rows.sum_of(coefficients, (domain.low, domain.high), 1.0)
+        operator = self._like_rows.sums_of([coefficients], (domain.low, domain.high), [1.0])
         names = ("stiffness", "mass")
         read = domain.read_low, domain.read_high
         found = self._like_rows.sums_of([_COEFFICIENTS[name] for name in names], read, (0.0, 0.0))
@@ -166,8 +167,8 @@ class LineProducts:
             return None
         self._rows = dict(zip(names, found, strict=True))
         station_types = rows.station_types if rows.varies else ()
-        self.layout = layout_of(operator.blocks, self._rows["stiffness"].blocks, station_types)
-        return operator if self.layout is not None else None
+        self.layout = layout_of(operator[0].blocks, self._rows["stiffness"].blocks, station_types)
+        return operator[0] if self.layout is not None else None
 
     @cached_property
     def _like_rows(self) -> LikeRows:
@@ -187,4 +188,5 @@ class LineProducts:
         if name in self._rows:
             return self._rows[name]
         read = self._domain.read_low, self._domain.read_high
-        return self._like_rows.sum_of(_COEFFICIENTS[name], read)
+        found = self._like_rows.sums_of([_COEFFICIENTS[name]], read, [0.0])
+        return None if found is None else found[0]

@@ -161,7 +161,6 @@ class PartSolver(KspSolver):
         return ksp
 
     def solve(self, right: Wrapped, solution: Wrapped) -> None:
-        """Solve A ``solution`` = ``right`` here."""
         self._solve(right, solution)
 
     def _solve_by_stations(self, right: Wrapped, solution: Wrapped) -> None:
@@ -179,7 +178,6 @@ class PartSolver(KspSolver):
 
     @property
     def failure(self) -> int:
-        """PETSc's reason why the last solve did not converge; 0 if it did."""
         return super().failure if self._uses_petsc else 0
 
     def bypass_ksp(self) -> None:

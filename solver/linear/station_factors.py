@@ -32,19 +32,20 @@ class StationFactors:
     Attributes
     ----------
     layout : Layout
-    starts : (n + 1,) first unknown of each station, and how many unknowns there are
+    stations : Sections
+    turning : arrays by which the place where elimination ends moves, None if it stays
+    arrays : ``native.FactorArrays``; its ``ends`` (5,) are read at each step: first station that a
+        step solves for and the one after the last, first own one that it takes on and the one after
+        the last, and where elimination ends
+
+    Parameters
+    ----------
     kinds : (n,) of the stations, see ``kinds_by_type``
     blocks : of each kind half of S^-1, with S the diagonal block after elimination, and, unless the
         layout is sparse, -B^T S^-1, with B the block towards the middle; packed by the layout
-    beside_kinds, besides : kinds of the matrix's own blocks between stations, and of each kind
-        those to the stations before and after it, negative
-    low : first station of a rank's own
-    ends : (5,) int, read at each step: first station that a step solves for and the one after the
-        last, first own one that it takes on and the one after the last, and where elimination ends
-    turning : arrays by which the place where elimination ends moves, None if it stays
-    n_stations, n_kinds : in the matrix, and how many have different factors
-    stations : Sections
-    arrays : ``native.FactorArrays``
+    besides : kinds of the matrix's own blocks between stations, and of each kind those to the
+        stations before and after it, negative
+    low, high : first station of a rank's own and the one after the last
     """
 
     def __init__(
@@ -53,23 +54,17 @@ class StationFactors:
         stations: Sections,
         kinds: np.ndarray,
         blocks: np.ndarray,
+        besides: tuple[np.ndarray, np.ndarray],
         low: int,
         high: int,
-        n_kinds: int,
-        besides: tuple[np.ndarray, np.ndarray],
         turning: native.Turning | None = None,
     ) -> None:
-        self.layout, self.kinds, self.blocks = layout, kinds, blocks
-        self.beside_kinds, self.besides = besides
-        self.starts, self.stations = stations.starts, stations
-        self.low, self.turning = low, turning
-        self.n_stations, self.n_kinds = kinds.size, n_kinds
+        self.layout, self.stations, self.turning = layout, stations, turning
         middle = (low + high) // 2 if turning is None else native.middle_of(low, high)
-        self.ends = np.array([0, kinds.size, low, high, middle], dtype=np.int64)
+        ends = np.array([0, kinds.size, low, high, middle], dtype=np.int64)
         if turning is not None:
             native.turn(kinds, turning, kinds.size - 1, middle)
-        numbers = self.kinds, self.blocks, self.beside_kinds, self.besides
-        self.arrays = native.FactorArrays(*numbers, low, self.ends, stations.places())
+        self.arrays = native.FactorArrays(kinds, blocks, *besides, low, ends, stations.places())
 
     @cached_property
     def _solves(self) -> native.Solves:
@@ -86,9 +81,10 @@ class StationFactors:
 
     def view(self, pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
         """Called by PETSc for -march_ksp_view."""
+        kinds = self.arrays.kinds
         viewer.printfASCII(
-            f"    exact factors of {self.n_stations} stations, of {self.n_kinds} kinds, from both "
-            "ends to the middle\n"
+            f"    exact factors of {kinds.size} stations, of {np.unique(kinds).size} kinds, from "
+            "both ends to the middle\n"
         )
 
 
@@ -117,15 +113,12 @@ def station_factors(
         return None
     found = FoundFactors.of(rows, None if turns else (low + high) // 2)
     station_type = stations.station_type[rows.chosen][found.kinds]
-    kinds, numbers, n_kinds = packed_factors(layout, station_type, found)
-    of_station = kinds[found.numbers]
-    if not turns:
-        return StationFactors(layout, stations, of_station, numbers, low, high, n_kinds, besides)
-    turning = native.Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :])
-    of_station = of_station[:n].copy()
-    return StationFactors(
-        layout, stations, of_station, numbers, low, high, n_kinds, besides, turning
-    )
+    kinds, numbers = packed_factors(layout, station_type, found)
+    of_station, turning = kinds[found.numbers], None
+    if turns:
+        turning = native.Turning(of_station[:n], of_station[n : 2 * n], of_station[2 * n :])
+        of_station = of_station[:n].copy()
+    return StationFactors(layout, stations, of_station, numbers, besides, low, high, turning)
 
 
 def layout_of_factors(layout: Layout, blocks: np.ndarray) -> Layout:
@@ -159,16 +152,14 @@ def packed_blocks(layout: Layout, factors: np.ndarray) -> np.ndarray:
 
 def packed_factors(
     layout: Layout, station_type: np.ndarray, found: FoundFactors
-) -> tuple[np.ndarray, np.ndarray, int]:
-    """Kinds of factors, their numbers and how many there are; see ``kinds_by_type``.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Kinds of factors and their numbers; see ``kinds_by_type``.
 
     ``station_type`` (m,) is that of each factor.
     """
-
-    def pack(part: Layout, rows: slice | np.ndarray) -> np.ndarray:
-        return packed_blocks(part, found.factors[rows])
-
-    return kinds_by_type(layout, station_type, pack)[:3]
+    return kinds_by_type(
+        layout, station_type, lambda part, rows: packed_blocks(part, found.factors[rows])
+    )[:2]
 
 
 def besides_of(
@@ -181,7 +172,7 @@ def besides_of(
         packed = [part.packed(-rows.blocks[place][chosen], "beside") for place in (0, 2)]
         return np.concatenate(packed, axis=1)
 
-    kinds, numbers, _, count = kinds_by_type(layout, stations.station_type[rows.chosen], pack)
+    kinds, numbers, count = kinds_by_type(layout, stations.station_type[rows.chosen], pack)
     joined = np.count_nonzero(rows.blocks[0]) + np.count_nonzero(rows.blocks[2])
     return (kinds[rows.kinds], numbers) if count == joined else None
 
@@ -219,7 +210,8 @@ class FoundFactors(NamedTuple):
         )
         here = np.zeros((len(triples), *before.shape[1:]))
         meetings = np.ascontiguousarray(triples).view(native.MEETING)[:, 0]
-        native.join(meetings, matrix, before, behind, here)
+        by_part = (own.reshape(-1, *own.shape[2:]) for own in (before, behind, here))
+        native.join(meetings, matrix, *by_part)
         n_before, n_behind = len(before), len(behind)
         parts = [at_before, n_before + at_behind, n_before + n_behind + at_middle.ravel()]
         numbers = np.concatenate(parts if middle is None else [parts[0], parts[2], parts[1]])

@@ -13,7 +13,6 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.base.mpi import MPI
-from catenary.solver.kernels import native
 from catenary.solver.linear.stations.like_stations import LikeStations
 from catenary.solver.model.alike import kinds_of
 from catenary.solver.model.model import Model
@@ -37,6 +36,8 @@ _FELT, _MARGIN = 1e-12, 1.1
 # Allowed part outside of windows that cannot be made wider any more: a force of 1e-7 N beside its
 # own. Columns fade with the way, so that this bears them half as wide again as those tried.
 FELT_AT_MOST = 1e-9
+# No answer is as small, but for one to no force.
+_TINY = np.finfo(float).tiny
 # By how much that reach grows where some column is felt further.
 _MORE = 1.5
 
@@ -269,9 +270,18 @@ class UnitResponses:
         answers = self._answers(dofs, weights, first, last, further)
         begin = places.begin[owned] + self._ownership.first - first
         low, high = (numbering.starts[station[owned]] for station in (places.first, places.last))
-        width, to = places.width[owned], at[places.width[chosen] > 0]
-        cuts = native.Cuts(low - first, high - first, begin, width, to)
-        return float(native.cut_out(answers, cuts, data))
+        parts = low - first, high - first, begin, places.width[owned], at[places.width[chosen] > 0]
+        n_forces, leak = dofs.shape[1], 0.0
+        for number, (before, after, start, width, to) in enumerate(
+            zip(*(part.tolist() for part in parts), strict=True)
+        ):
+            own = answers[n_forces * number : n_forces * (number + 1)]
+            data[to : to + n_forces * width] = own[:, start : start + width].ravel()
+            size = np.abs(own)
+            peak = size.max(axis=1)
+            size[:, before:after] = 0.0
+            leak = max(leak, float((size.max(axis=1) / np.maximum(peak, _TINY)).max()))
+        return leak
 
 
 class Places(NamedTuple):

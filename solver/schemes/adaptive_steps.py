@@ -226,7 +226,6 @@ class StepLevels(Scheme):
             parts.scheme.counters = counters
 
     def step(self, time: float, stop: bool) -> bool:
-        """Advance by one interval of the record to ``time`` [s]; see `schemes.Scheme`."""
         whole, done, goes_on = 2**self._finest, 0, True
         while done < whole:
             level = self._wanted
@@ -250,7 +249,6 @@ class StepLevels(Scheme):
         stiffness: np.ndarray,
         compliance: np.ndarray,
     ) -> Decision:
-        """Accept or reject a step; parameters as in `schemes.StepController`. Rank 0 only."""
         level, size = self._tried, self._dt / 2**self._tried
         error = self._error.of(time, depth, force, stiffness, compliance)
         decision = Decision(True, level)
@@ -264,7 +262,6 @@ class StepLevels(Scheme):
         return decision
 
     def set_level(self, level: int) -> None:
-        """Set the level of the next step. All ranks."""
         self._wanted = level
 
     def state(self) -> np.ndarray:

@@ -118,11 +118,9 @@ class FixedPoint(Scheme):
             raise StepRejected
 
     def state(self) -> np.ndarray:
-        """The latest forces, and what the law remembers, as one array."""
         return np.concatenate([self._force, self.law.state()])
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         n = self._force.size
         self._force = state[:n].copy()
         self.law.restore(state[n:])

@@ -6,7 +6,7 @@ Schemes are entries of ``SCHEMES``; all but the usual one are imported where the
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from catenary.solver.contact.contact_wire import ContactWires
@@ -21,11 +21,10 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import uses_rate
-from catenary.solver.problem.problem import Placement, Problem
+from catenary.solver.problem.problem import Problem
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import ChangedLine
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 from catenary.solver.window.choice import opens_window
 from catenary.solver.window.moving_window import MovingWindow, wanted_pieces
 
@@ -45,82 +44,67 @@ class Parts:
         self.line.destroy()
 
 
-@dataclass(frozen=True)
-class SchemeFactory:
-    """Inputs of parts, whatever has happened to the line. ``make`` is collective.
+def make_parts(
+    comm: Any,
+    ownership: Ownership,
+    problem: Problem,
+    changed: ChangedLine,
+    pantographs: Pantographs,
+    wires: ContactWires | None = None,
+) -> Parts:
+    """The parts for the problem's numerics, of a line at rest. Collective.
 
-    Parameters
-    ----------
-    comm : mpi4py communicator
-    form, ownership : the line's first rest shape, and which rank owns what
-    nominal_height : head height at which the static force of a placement is defined [m]
+    ``pantographs`` are those of the problem, made for the same numerics; ``wires`` those of the
+    line that no other parts have, made here if None.
     """
-
-    comm: Any
-    form: Equilibrium
-    ownership: Ownership
-    nominal_height: Callable[[Placement], float]
-
-    def make(
-        self,
-        problem: Problem,
-        changed: ChangedLine,
-        pantographs: Pantographs,
-        wires: ContactWires | None = None,
-    ) -> Parts:
-        """The parts for the problem's numerics, of a line at rest. Collective.
-
-        ``pantographs`` are those of the problem, made for the same numerics; ``wires`` those of
-        the line that no other parts have, made here if None.
-        """
-        comm, model, train = self.comm, changed.model, problem.train
-        # Droppers may have another tension in the first rest than they had then.
-        own, numerics = replace(self, form=changed.form), problem.numerics
-        in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
-        wanted = wanted_pieces(problem, model, pantographs.candidates.place)
-        if comm.size > 1 or pantographs.across.size:
-            wanted = None
-        line = make_line(comm, model, self.ownership, numerics, not in_parts, wanted)
-        laws = model.simulated
-        trailing = max(placement.behind for placement in train.placements)
-        range_of_run = (
-            train.start - trailing - pantographs.reach[0],
-            train.end + pantographs.reach[1],
-        )
-        wires = wires or ContactWires(model, own.form, self.ownership)
-        links = FollowedLinks(switching_links(model, own.form.dropper_force), line)
-        columns = ForceColumns(comm, model, wires, line, links, range_of_run)
-        interaction = ForcesOnLine(
-            comm,
+    model, form = changed.model, changed.form
+    numerics, train = problem.numerics, problem.train
+    in_parts = numerics.scheme != "one_solve" or numerics.coupling == "explicit"
+    wanted = wanted_pieces(problem, model, pantographs.candidates.place)
+    if comm.size > 1 or pantographs.across.size:
+        wanted = None
+    line = make_line(comm, model, ownership, numerics, not in_parts, wanted)
+    laws = model.simulated
+    trailing = max(placement.behind for placement in train.placements)
+    range_of_run = (
+        train.start - trailing - pantographs.reach[0],
+        train.end + pantographs.reach[1],
+    )
+    wires = wires or ContactWires(model, form, ownership)
+    # Droppers may have another tension in the first rest than they had then.
+    links = FollowedLinks(switching_links(model, form.dropper_force), line)
+    columns = ForceColumns(comm, model, wires, line, links, range_of_run)
+    interaction = ForcesOnLine(
+        comm,
+        model,
+        form,
+        wires,
+        line,
+        links,
+        columns,
+        pantographs.candidates,
+        train.speed,
+        uses_rate(laws.contact),
+        pantographs.across,
+        pantographs.work,
+    )
+    if opens_window(problem, comm.size, line.passes is not None):
+        assert line.passes is not None
+        window = MovingWindow(
+            problem.window,
+            numerics.dt,
             model,
-            own.form,
-            wires,
-            line,
-            links,
-            columns,
-            pantographs.candidates,
-            train.speed,
-            uses_rate(laws.contact),
-            pantographs.across,
-            pantographs.work,
+            line.passes.factors,
+            pantographs.candidates.place,
+            interaction.reach,
+            links.links.unknowns,
+            links.moving,
+            line.passes.known,
+            line.operators.in_pieces,
         )
-        if opens_window(problem, comm.size, line.passes is not None):
-            assert line.passes is not None
-            window = MovingWindow(
-                problem.window,
-                numerics.dt,
-                model,
-                line.passes.factors,
-                pantographs.candidates.place,
-                interaction.reach,
-                links.links.unknowns,
-                links.moving,
-                line.passes.known,
-                line.operators.in_pieces,
-            )
-            line.open_window(window)
-        scheme = SCHEMES[numerics.scheme](own, problem, model, interaction, pantographs)
-        return Parts(line, interaction, pantographs, scheme)
+        line.open_window(window)
+    scheme = SCHEMES[numerics.scheme](comm, problem, changed, interaction, pantographs)
+    return Parts(line, interaction, pantographs, scheme)
 
 
 def one_solve(
@@ -132,7 +116,7 @@ def one_solve(
 ) -> OneSolve:
     """The scheme ``one_solve``, with the coupling that the problem's numerics ask for. Collective.
 
-    Parameters are those of ``SchemeFactory.make`` and what it makes.
+    Parameters are those of ``make_parts`` and what it makes.
     """
     links = interaction.link_coupling
     coupled = no_links() if links is None else links.coupled
@@ -141,20 +125,22 @@ def one_solve(
 
 
 def _fixed_point(
-    factory: SchemeFactory,
+    comm: Any,
     problem: Problem,
-    model: Model,
+    changed: ChangedLine,
     interaction: ForcesOnLine,
     pantographs: Pantographs,
 ) -> Scheme:
     from catenary.solver.schemes.fixed_point import FixedPoint
 
-    law = law_in_steps(problem, model.simulated, pantographs.n_contacts)
-    return FixedPoint(factory.comm, interaction, pantographs, problem.numerics, law)
+    law = law_in_steps(problem, changed.model.simulated, pantographs.n_contacts)
+    return FixedPoint(comm, interaction, pantographs, problem.numerics, law)
 
 
 # Makers of schemes by ``Numerics.scheme``.
-SCHEMES: dict[str, Callable[[SchemeFactory, Problem, Model, ForcesOnLine, Pantographs], Scheme]] = {
-    "one_solve": lambda factory, *made: one_solve(factory.comm, *made),
+SCHEMES: dict[str, Callable[[Any, Problem, ChangedLine, ForcesOnLine, Pantographs], Scheme]] = {
+    "one_solve": lambda comm, problem, changed, *acting: one_solve(
+        comm, problem, changed.model, *acting
+    ),
     "fixed_point": _fixed_point,
 }

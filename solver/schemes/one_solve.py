@@ -122,11 +122,9 @@ class OneSolve(Scheme):
             self.pantographs.advance(force, self.coupling.law.reported(force), found.depth)
 
     def state(self) -> np.ndarray:
-        """Memory of coupling and law, as one array."""
         return self.coupling.state()
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         self.coupling.restore(state)
 
     @property

@@ -61,19 +61,7 @@ class StepController(Protocol):
         stiffness: np.ndarray,
         compliance: np.ndarray,
     ) -> Decision:
-        """Accept or reject a step from its results at n contacts. Rank 0 only.
-
-        Parameters
-        ----------
-        time : float
-            Time at the end of the step [s].
-        depth, force : ndarray, shape (n,)
-            Depths [m] and contact forces [N] at the end of the step.
-        stiffness : ndarray, shape (n,)
-            Slope of the contact law at these depths [N/m].
-        compliance : ndarray, shape (n,)
-            Decrease of the depth by a unit force within the step [m/N].
-        """
+        """Accept or reject a step; parameters as of `StepError.of`. Rank 0 only."""
 
     def set_level(self, level: int) -> None:
         """Set the level of the next step, as ``decide`` returned it on rank 0. All ranks."""

@@ -14,7 +14,6 @@ import gc
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
-from catenary.solver.schemes.make_scheme import Parts, SchemeFactory
+from catenary.solver.schemes.make_scheme import Parts, make_parts
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.changed_line.after_incidents import (
@@ -89,6 +88,10 @@ class March:
 
     A context manager that destroys itself.
 
+    Attributes
+    ----------
+    first_step : number of the step that it goes on from
+
     Parameters
     ----------
     comm : mpi4py communicator
@@ -119,16 +122,14 @@ class March:
         height = nominal_height_rule(
             self._wire, elasticity, air_speed, problem.contact, with_laws=effects.pantograph_laws
         )
-        self._nominal_height = height
         self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
         self._moving = MovingColumns()
-        self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         # Arrays of a long line are large, so that the first parts take these.
         self._set_up(unchanged(model, form), self._wire)
         self._set_off(model)
         self._showing.cross(0.0)
         give_back(model.n_unknowns)
-        self._first_step = 0
+        self.first_step = 0
         self._happened: tuple[LineIncident, ...] = ()
         self._ahead = self._happening()
         if self.slow_path is not None and comm.rank == 0:
@@ -137,7 +138,9 @@ class March:
     def _set_up(self, changed: ChangedLine, wires: ContactWires | None = None) -> None:
         """Make all that steps a line and shows it, from a line that is at rest. Collective."""
         self._changed = changed
-        parts = self._set_ups.make(self._problem, changed, self._pantographs, wires)
+        parts = make_parts(
+            self._comm, self.ownership, self._problem, changed, self._pantographs, wires
+        )
         self._line, self._scheme = parts.line, parts.scheme
         if self._problem.numerics.adaptive_tolerance is not None:
             self._scheme = self._in_levels(changed, parts)
@@ -172,10 +175,9 @@ class March:
             numerics = replace(problem.numerics, dt=problem.numerics.dt / 2**level)
             finer_problem = replace(problem, numerics=numerics)
             laws = self._first.simulated
-            pantographs = Pantographs(
-                self._comm, finer_problem, laws, self._wire, self._nominal_height
-            )
-            return self._set_ups.make(finer_problem, changed, pantographs)
+            height = self._pantographs.nominal_height
+            pantographs = Pantographs(self._comm, finer_problem, laws, self._wire, height)
+            return make_parts(self._comm, self.ownership, finer_problem, changed, pantographs)
 
         return StepLevels(self._comm, problem.numerics, whole, finer)
 
@@ -234,21 +236,21 @@ class March:
         InputError
             On all ranks, if it is not one of this line, or beyond the end of the run.
         """
-        self._first_step = int(checkpoint["step"])
-        if not 0 <= self._first_step <= self.n_steps:
+        self.first_step = int(checkpoint["step"])
+        if not 0 <= self.first_step <= self.n_steps:
             raise InputError(
-                f"the state to continue from is of step {self._first_step}, and the run has "
+                f"the state to continue from is of step {self.first_step}, and the run has "
                 f"{self.n_steps}; start the run anew"
             )
         happening = self._happening()
-        past = [happened for happened in happening if happened.step < self._first_step]
+        past = [happened for happened in happening if happened.step < self.first_step]
         incidents = past[-1].incidents if past else ()
         if incidents != self._happened:
             self.destroy()
             changed = changed_line(self._first, self._form, incidents)
             self._set_up(changed if incidents else unchanged(self._first, self._form))
         self._happened, self._ahead = incidents, happening[len(past) :]
-        time = self._first_step * self._problem.numerics.dt
+        time = self.first_step * self._problem.numerics.dt
         self._pantographs.move_to(time)
         self._showing.checkpoints.restore(checkpoint)
         self._showing.cross(time, found=True)
@@ -270,13 +272,16 @@ class March:
         RunBroken
             If an observer cannot start.
         """
-        dt, first = self._problem.numerics.dt, self._first_step
+        dt, first = self._problem.numerics.dt, self.first_step
         since = first
         ahead = [happened for happened in self._ahead if happened.step < self.n_steps]
         ends = [*(happened.step for happened in ahead), self.n_steps]
+
         # PETSc's monitors of the solution look at each.
-        fill = (lambda: self._line.fill_solution()) if wants_solution() else None
-        observer_list = ObserverList(observers, fill)
+        def fill() -> None:
+            self._line.solution.setArray(self._line.displacement)
+
+        observer_list = ObserverList(observers, fill if wants_solution() else None)
         ts = self._make_ts(observer_list, stop_requested, first, ends[0])
         try:
             observer_list.start(self._showing.stage(dt, first * dt, self.n_steps))
@@ -328,29 +333,6 @@ class March:
             "" if self.slow_path is None else str(self.slow_path),
             finishing,
         )
-
-    def write_line(self, path: Path, most_speed: float) -> int:
-        """Write a line that is stepped from outside, see `prepared_line`; for how many steps.
-
-        Its train can be given speeds below ``most_speed`` [m/s]. Not collective; one rank only.
-
-        Raises
-        ------
-        InputError
-            If steps of the scene need more than the compiled loop.
-        RunBroken
-            If the file cannot be written.
-        """
-        from catenary.solver.time_loop.prepared_line import write_line
-
-        scheme, showing, dt = self.in_loop()
-        blocks = compiled_steps(scheme, showing, dt, shows=False)
-        assert blocks is not None
-        numbering = self._changed.model.numbering
-        turns = numbering.numbers[:, [name.startswith("theta") for name in numbering.names]]
-        steps = self._first_step, self.n_steps
-        write_line(path, blocks, dt, steps, turns[turns >= 0], most_speed)
-        return self.n_steps - self._first_step
 
     def in_loop(self) -> tuple[OneSolve, Showing, float]:
         """Scheme, shown channels and time step [s] of a march that one compiled loop takes

@@ -22,6 +22,7 @@ from catenary.solver.kernels import native
 from catenary.solver.model.beam import MOST_ROTATION
 from catenary.solver.schemes.one_solve import OneSolve
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
+from catenary.solver.time_loop.march import March
 
 # Links of a long line that may switch in one step: mostly it is some ten. These take 7 MB.
 _MOST_LINKS = 512
@@ -30,39 +31,28 @@ _MOST_LINKS = 512
 _LOOKS = 1.0
 
 
-def write_line(
-    path: Path,
-    blocks: CompiledSteps,
-    dt: float,
-    steps: tuple[int, int],
-    turns: np.ndarray,
-    most_speed: float,
-) -> None:
-    """Write a line as it is now, with what steps to come depend on. Not collective.
+def write_line(march: March, path: Path, most_speed: float) -> int:
+    """Write a line as it is now, with what steps to come depend on; for how many of these. Not
+    collective; one rank only.
 
     Parameters
     ----------
+    march : March
+        Line with its train.
     path : Path
         File to be written.
-    blocks : CompiledSteps
-        Loop that takes the steps of the line.
-    dt : float
-        Time step [s].
-    steps : tuple of int
-        Numbers of the latest step and of the last one to come.
-    turns : ndarray
-        Unknowns of rotation of all wires.
     most_speed : float
         Speed of the slowest wave, below which the train can be given any speed, or infinite [m/s].
 
     Raises
     ------
     InputError
-        If loads are made while they are stepped, or only a part of the line is there.
+        If steps of the scene need more than the compiled loop, loads are made while they are
+        stepped, or only a part of the line is there.
     RunBroken
         If the file cannot be written.
     """
-    scheme = blocks.scheme
+    scheme, showing, dt = march.in_loop()
     line, pantographs = scheme.interaction.line, scheme.pantographs
     if line.loads is not None and line.loads.are_sampled:
         raise InputError(
@@ -75,7 +65,9 @@ def write_line(
             'take window.mode = "off"'
         )
     make_room(scheme)
-    first, last = steps
+    first, last = march.first_step, march.n_steps
+    numbering = line.windows.numbering
+    turns = numbering.numbers[:, [name.startswith("theta") for name in numbering.names]]
     models = [stepped_by_kernels(model) for model in pantographs.models]
     drives = np.zeros((last - first, len(models), drive_width(pantographs.most_contacts)))
     pantographs.fill_drives(np.arange(first + 1, last + 1) * dt, drives)
@@ -88,7 +80,7 @@ def write_line(
         one_speed=pantographs.along_track or bool(drives[..., N_DRIVE:].any()),
         most_speed=most_speed,
         longest_way=end - float(pantographs.places_along.start.max()),
-        turns=turns.astype(np.int64),
+        turns=turns[turns >= 0].astype(np.int64),
         most_turn=MOST_ROTATION,
         look_steps=max(1, round(_LOOKS / dt)),
     )
@@ -98,7 +90,7 @@ def write_line(
     if path.is_file() or not path.exists():
         made_as = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        blocks.steps().write(str(made_as), ahead)
+        CompiledSteps(scheme, showing, dt, shows=False).steps().write(str(made_as), ahead)
         if made_as != path:
             made_as.replace(path)
     except (OSError, RuntimeError) as error:
@@ -107,6 +99,7 @@ def write_line(
         if made_as != path:
             with contextlib.suppress(OSError):
                 made_as.unlink(missing_ok=True)
+    return last - first
 
 
 def make_room(scheme: OneSolve) -> None:

@@ -35,7 +35,6 @@ class MovingWindow:
     Attributes
     ----------
     arrays : ``native.Window``
-    unknowns : first unknown that moves and the one after the last, as of the latest look
 
     Parameters
     ----------
@@ -92,8 +91,8 @@ class MovingWindow:
             high=np.ascontiguousarray(numbering.high),
             starts=starts,
             links_before=before.astype(np.int64),
-            ends=factors.ends,
-            kinds=factors.kinds,
+            ends=factors.arrays.ends,
+            kinds=factors.arrays.kinds,
             turning=factors.turning,
             links=moving_links,
             ranges=np.zeros((2, 2), dtype=np.int64),
@@ -127,8 +126,7 @@ class MovingWindow:
         begin, end = max(0, min(begin, end - LEAST)), min(n, max(end, begin + LEAST))
         if not arrays.state[IS_FRESH]:
             begin, end = min(begin, int(arrays.ends[2])), max(end, int(arrays.ends[3]))
-        if not self._is_covered(begin - _AROUND, end + _AROUND):
-            self._have(max(0, begin - _AROUND), min(n, end + _AROUND))
+        self.provide_rows(max(0, begin - _AROUND), min(n, end + _AROUND))
 
     def _spans_around(self, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
         """Ends of a window of spans around contacts from ``first`` to ``last`` [m]: as numbers of
@@ -154,12 +152,13 @@ class MovingWindow:
 
     def provide_rows(self, begin: int, end: int) -> None:
         """Have products with the rows of stations from ``begin`` to before ``end``."""
-        if not self.has_rows(begin, end):
-            self._have(begin, end)
+        if self._operators is not None and not self.has_rows(begin, end):
+            self._covered = self._operators.pieces.cover(begin, end)
 
     def has_rows(self, begin: int, end: int) -> bool:
         """Whether there are products with these rows."""
-        return self._operators is None or self._is_covered(begin, end)
+        first, last = self._covered
+        return self._operators is None or (first <= begin and end <= last)
 
     @property
     def most_rows(self) -> int:
@@ -169,30 +168,11 @@ class MovingWindow:
         pieces = self._operators.pieces
         return pieces.size * (pieces.n_slots - 1)
 
-    def _is_covered(self, begin: int, end: int) -> bool:
-        n = self.arrays.low.size
-        return self._covered[0] <= max(0, begin) and min(n, end) <= self._covered[1]
-
-    def _have(self, begin: int, end: int) -> None:
-        """Have pieces with the stations from ``begin`` to before ``end``."""
-        assert self._operators is not None
-        self._covered = self._operators.pieces.cover(begin, end)
-
-    @property
-    def unknowns(self) -> tuple[int, int]:
-        begin, end = self.arrays.ends[2:4]
-        return int(self.arrays.starts[begin]), int(self.arrays.starts[end])
-
     @property
     def stations(self) -> tuple[np.ndarray, np.ndarray]:
         """The first station that moves and the one after the last, kept up to date, and first
         unknowns (n + 1,) of all stations."""
         return self.arrays.ends, self.arrays.starts
-
-    @property
-    def n_stations(self) -> int:
-        """Number of moving stations."""
-        return int(self.arrays.ends[3] - self.arrays.ends[2])
 
     def state(self) -> np.ndarray:
         """Steps taken, range of stations and largest motion, as numbers to go on from."""
@@ -203,19 +183,15 @@ class MovingWindow:
         """Open the window to all stations until the next look, as after a change of the motion."""
         arrays = self.arrays
         arrays.state[:] = 0, 1
-        self._open(0, arrays.low.size)
+        native.turn_to(arrays, 0, arrays.low.size)
 
     def restore(self, state: np.ndarray) -> None:
         """Go on from a ``state``."""
         arrays = self.arrays
         step, is_fresh, begin, end = state[:4].astype(np.int64).tolist()
         arrays.state[STEP], arrays.state[IS_FRESH] = step, is_fresh
-        self._open(begin, end)
+        native.turn_to(arrays, begin, end)
         arrays.peak[:] = state[4:6]
-
-    def _open(self, begin: int, end: int) -> None:
-        """Set the window to stations from ``begin`` to ``end``; the motion stays as it is."""
-        native.turn_to(self.arrays, begin, end)
 
 
 def wanted_pieces(problem: Problem, model: Model, contacts: np.ndarray) -> WantedPieces | None:

@@ -19,11 +19,11 @@ from catenary.base.petsc import PETSc
 from catenary.solver.contact.forces_on_line import ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.linear.petsc_solvers import PREFIX
-from catenary.solver.model.model import Model
 from catenary.solver.problem.integrator_parameters import GENERALIZED_ALPHA, NEWMARK, integration_of
 from catenary.solver.problem.problem import Numerics, Problem
-from catenary.solver.schemes.make_scheme import SCHEMES, SchemeFactory
+from catenary.solver.schemes.make_scheme import SCHEMES
 from catenary.solver.schemes.scheme import Counters, find_crossings
+from catenary.solver.statics.changed_line.after_incidents import ChangedLine
 
 # Norm of what may be left of the forces [N], and what short steps add to it by round-off of
 # inertia forces, some ten times eps of masses below 100 kg and ways below 0.1 m [N s2].
@@ -198,16 +198,16 @@ def _integration(numerics: Numerics) -> tuple[float, float, float, float]:
 
 
 def _make(
-    factory: SchemeFactory,
+    comm: Any,
     problem: Problem,
-    model: Model,
+    changed: ChangedLine,
     interaction: ForcesOnLine,
     pantographs: Pantographs,
 ) -> TSAlpha2:
-    assert factory.comm.size == 1
+    assert comm.size == 1
     loads = interaction.line.loads
-    system = WholeSystem(problem, model, factory.form, factory.nominal_height, loads)
-    return TSAlpha2(factory.comm, interaction, pantographs, system, problem.numerics)
+    system = WholeSystem(problem, changed.model, changed.form, pantographs.nominal_height, loads)
+    return TSAlpha2(comm, interaction, pantographs, system, problem.numerics)
 
 
 SCHEMES[TS_ALPHA2] = _make

@@ -20,7 +20,7 @@ from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.coupling import Coupling, make_coupling
-from catenary.solver.contact_problem.law_tangents import LinearInSteps
+from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem
 
@@ -76,7 +76,7 @@ class Wall:
         self.mass = LumpedPantograph(
             LumpedData((mass,), (0.0,), (0.0,)), 0.0, 0.0, Stepping(raise_time=0.0, dt=dt)
         )
-        law = LinearInSteps(LinearLaw(stiffness, 0.0), 1, pulls=True)
+        law = LawInSteps(1, stiffness, 0.0, pulls=True)
         accurate = numerics(dt, coupling=coupling, eps_force=1e-9)
         self.coupling: Coupling = make_coupling(law, no_links(), accurate)
         self.heads, self.dt, self.time = Heads(1), dt, 0.0

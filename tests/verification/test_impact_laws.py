@@ -24,8 +24,8 @@ from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem
-from catenary.solver.contact_problem.law_tangents import HertzInSteps, LawInSteps, LinearInSteps
-from catenary.solver.problem.contact_laws import HYSTERESIS, HertzLaw, LinearLaw
+from catenary.solver.contact_problem.law_tangents import HertzInSteps, LawInSteps
+from catenary.solver.problem.contact_laws import HYSTERESIS, HertzLaw
 
 MASS, STIFFNESS = 8.0, 1e6
 
@@ -137,7 +137,7 @@ def test_restitution_depends_neither_on_speed_nor_on_exponent(
 
 def test_a_spring_alone_gives_back_all_it_takes() -> None:
     """Hertz without hysteresis, and the linear spring: order 2 in dt towards e = 1."""
-    for law in (hertz(0.0), LinearInSteps(LinearLaw(5e4, 0.0), 1, pulls=False)):
+    for law in (hertz(0.0), LawInSteps(1, 5e4, 0.0, pulls=False)):
         found = Bounce(law, 1e-4).leaves_with(0.5) / 0.5
         check("restitution", found, 1.0, within=2e-3)
 
@@ -160,7 +160,7 @@ def test_linear_spring_and_damper_lose_what_the_oscillator_loses() -> None:
         return float(speed * np.exp(-decay * t) * swing)
 
     end = brentq(lambda t: k * depth(t) + c * rate(t), 0.5 * np.pi / damped, np.pi / damped)
-    law = LinearInSteps(LinearLaw(k, c), 1, pulls=False)
+    law = LawInSteps(1, k, c, pulls=False)
     found = Bounce(law, 1e-5).leaves_with(speed)
     # The damper acts at once with c v: the step of first touch is off by its share of dt.
     check("speed [m/s]", found, -rate(end), within=2 * c * speed / MASS * 1e-5 + 1e-4 * speed)
@@ -181,7 +181,7 @@ def test_a_linear_damper_brakes_before_the_touch() -> None:
         return bounce.velocity
 
     lost = c**2 / (2.0 * k * MASS)
-    found = at_touch(LinearInSteps(LinearLaw(k, c), 1, pulls=False))
+    found = at_touch(LawInSteps(1, k, c, pulls=False))
     check("part of the speed", 1.0 - found / speed, lost, within=2.0 * lost**2)
     # The step of the touch is part of the contact: K d^1.5 of d = v dt, some 1e-9 of it.
     check("speed [m/s]", at_touch(hertz(HYSTERESIS["flores"](0.5))), speed, within=1e-6)

@@ -28,10 +28,9 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
-from catenary.solver.contact_problem.law_tangents import LinearInSteps
+from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 from catenary.solver.model.link_directions import swings_of_droppers
-from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 # Systems have condition numbers below 1e4 and numbers of the order of one; shares are found to
@@ -66,7 +65,7 @@ class Step:
         line = LineResponse(1, size)
         line.count, line.present[:] = size, 0.0
         line.rows.numbers[:, 0], line.rows.numbers[:, 1] = np.arange(size), self.reserve
-        law = LinearInSteps(LinearLaw(1.0, 0.0), 1, pulls=False)
+        law = LawInSteps(1, 1.0, 0.0, pulls=False)
         return InnerProblem(law, links).solve(line, Heads(1))
 
     def solve(self) -> tuple[np.ndarray, bool]:

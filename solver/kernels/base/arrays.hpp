@@ -53,20 +53,6 @@ struct Array3 {
     std::span<T> all() const { return {data, static_cast<size_t>(n * rows * columns)}; }
 };
 
-/// Sets (n,) of tables (parts, rows, columns), one after another.
-template <class T>
-struct Array4 {
-    T* data = nullptr;
-    int64_t n = 0, parts = 0, rows = 0, columns = 0;
-    auto sizes() { return std::tie(n, parts, rows, columns); }
-
-    Array3<T> operator[](int64_t number) const {
-        const int64_t each = parts * rows * columns;
-        return {all().subspan(number * each, each).data(), parts, rows, columns};
-    }
-    std::span<T> all() const { return {data, static_cast<size_t>(n * parts * rows * columns)}; }
-};
-
 /// How many numbers there are, as an index may count.
 template <class T>
 int64_t size(std::span<T> array) {

@@ -104,30 +104,4 @@ void TwoPasses::after_stretch() {
     reserves_within(motion, links, before[1], now[1], reserve);
 }
 
-void left_behind(std::span<const int64_t> starts, int64_t stretch, Array2<const int64_t> unknowns,
-                 Array2<int64_t> ranges) {
-    const int64_t n = unknowns.rows, own = size(starts) - 1, middle = own / 2;
-    const int64_t pairs = (own - 1) / 2;
-    auto is_within = [&](int64_t link, int64_t begin, int64_t end) {
-        const auto [least, most] = std::ranges::minmax(unknowns[link]);
-        return begin <= least && most < end;
-    };
-    int64_t first = 0;
-    while (first < n && unknowns(first, 0) < starts[middle]) ++first;
-    int64_t last = first;
-    ranges(0, 0) = ranges(0, 1) = first;
-    for (int64_t number = 1; number < ranges.rows; ++number) {
-        const int64_t reach = std::min(number * stretch, pairs);
-        int64_t begin = starts[middle - reach], end = starts[middle + reach + 1];
-        if (number == ranges.rows - 1) {
-            begin = 0;
-            end = starts[own];
-        }
-        while (first > 0 && is_within(first - 1, begin, end)) --first;
-        while (last < n && is_within(last, begin, end)) ++last;
-        ranges(number, 0) = first;
-        ranges(number, 1) = last;
-    }
-}
-
 }  // namespace catenary

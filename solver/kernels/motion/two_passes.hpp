@@ -42,7 +42,7 @@ struct PassLine {
 };
 
 /// Links whose reserves are found on the way back, which is taken in stretches of so many pairs of
-/// stations: `ranges` (n + 1, 2) are the links behind each, see `left_behind`.
+/// stations: `ranges` (n + 1, 2) are the links that it has left behind with each.
 struct TrackedLinks {
     Links links;
     std::span<double> reserve;  ///< [N], filled
@@ -79,12 +79,5 @@ class TwoPasses : private Around {
     int64_t n_followed_ = 0;
     std::optional<Window> window_;
 };
-
-/// Links that the pass back has left behind with each stretch: links from the first of both numbers
-/// of `ranges` (n_stretches + 1, 2) to the second have all their `unknowns` (n, m) solved by then.
-/// Unknowns of the rank's n_own stations begin at `starts` (n_own + 1,), so that few links wait for
-/// the next stretch. The last stretch is all that is left.
-void left_behind(std::span<const int64_t> starts, int64_t stretch, Array2<const int64_t> unknowns,
-                 Array2<int64_t> ranges);
 
 }  // namespace catenary

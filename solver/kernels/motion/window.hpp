@@ -31,7 +31,7 @@ struct Window {
     std::span<int32_t> kinds;               ///< of factors
     Turning turning;
     std::span<int64_t> links;  ///< the first link that may switch and the one after the last
-    Array2<int64_t> ranges;    ///< (2, 2) the same for the pass back, see `left_behind`
+    Array2<int64_t> ranges;    ///< (2, 2) the same for the pass back, see `TrackedLinks`
     std::span<double> known;   ///< known accelerations beside x, y and z, if the motion has them
     CATENARY_RECORD(state, every, guard, by_motion, spans_behind, spans_ahead, fading, is_exact,
                     peak, contacts, loaded, margin, masts, low, high, starts, links_before, ends,

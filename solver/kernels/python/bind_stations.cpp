@@ -75,7 +75,7 @@ class Products {
             const auto starts = rows_.sections.starts.subspan(first, n);
             starts_.assign(starts.begin(), starts.end());
             for (auto& start : starts_) start -= starts[0];
-            work_.factored.places = {starts_.data(), &rows_.sections.station_type[first]};
+            work_.factored.places = {starts_, part(rows_.sections.station_type, first, first + n)};
         }
         line_.set_runs(work_, n, 0);
     }
@@ -147,7 +147,7 @@ void offer_stations(py::module_& m) {
     offer(m, "middle_of", middle_of, "");
     offer(m, "turn", turn, "");
     offer(m, "eliminate", eliminated, "");
-    offer(m, "join", join, "m, b=b, * 2 b b, * 2 b b, m 2 b b");
+    offer(m, "join", join, "m, b=b, * b b, * b b, 2m b b");
     m.def("are_compiled", &are_compiled, py::arg("rows"), py::arg("factors"));
     py::class_<Layout>(m, "Layout")
         .def(py::init(&layout_of), py::arg("own"), py::arg("beside"), py::arg("damped"),
@@ -175,7 +175,6 @@ void offer_stations(py::module_& m) {
         .def("open", taking(&TwoPasses::open, "window"))
         .def("step", &TwoPasses::step)
         .def("predict_velocities", py::overload_cast<>(&TwoPasses::predict_velocities));
-    offer(m, "left_behind", left_behind, "s>1, *, l m, r>1 2");
 }
 
 }  // namespace catenary::python

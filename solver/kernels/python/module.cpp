@@ -5,7 +5,6 @@
 #include "base/targets.hpp"
 #include "line/condensing.hpp"
 #include "line/gusts.hpp"
-#include "line/short_columns.hpp"
 #include "loads/fourier.hpp"
 #include "loads/loads.hpp"
 #include "motion/links.hpp"
@@ -34,7 +33,7 @@ void offer_base(py::module_& module) {
 
 void offer_line(py::module_& module) {
     offer_records<Motion, Newmark, Alpha, Columns, Shown, Window, Changing, Sampled, Loads,
-                  MemoryTables, Memories, Cuts, Links, Dependents>(module);
+                  MemoryTables, Memories, Links, Dependents>(module);
     CATENARY_OFFER_TYPE(module, "RESERVE", Reserve, rest, stiffness, damping, place, released,
                         carried);
     offer(module, "predict", predict, "n, n, n, n");
@@ -59,7 +58,6 @@ void offer_line(py::module_& module) {
     offer(module, "fourier_forth", fourier_forth, "n>0, n..");
 
     offer(module, "condense_spans", condense_spans, "z 3, 3 n b>0, 3 n k, z k k");
-    offer(module, "cut_out", cut_out, "");
     offer(module, "bridge", bridge, "k, k, k, m+1, m k, m k");
     offer(module, "add_waves", add_waves, "s k, k m, s m");
 }

@@ -152,17 +152,17 @@ Eliminated eliminate(std::span<const int32_t> kinds, const StationBlocks& blocks
 }
 
 void join(std::span<const Meeting> meetings, const StationBlocks& blocks,
-          Array4<const double> before, Array4<const double> after, Array4<double> factors) {
+          Array3<const double> before, Array3<const double> after, Array3<double> factors) {
+    auto carried = [](const auto& of, int64_t factor) { return of[kParts * factor + kCarried]; };
     std::vector<double> row(blocks.own.rows);
     for (int64_t i = 0; i < size(meetings); ++i) {
         const Meeting& meeting = meetings[i];
-        const auto factor = factors[i];
-        const Matrix pivot = factor[kInverse];
+        const Matrix pivot = factors[kParts * i + kInverse];
         copy(blocks.own[meeting.kind], pivot);
         if (meeting.before >= 0)
-            condense(blocks.before[meeting.kind], before[meeting.before][kCarried], pivot, row);
+            condense(blocks.before[meeting.kind], carried(before, meeting.before), pivot, row);
         if (meeting.after >= 0)
-            condense(blocks.after[meeting.kind], after[meeting.after][kCarried], pivot, row);
+            condense(blocks.after[meeting.kind], carried(after, meeting.after), pivot, row);
         invert_pivot(pivot);
     }
 }

@@ -31,10 +31,10 @@ struct Meeting {
     int64_t kind, before, after;
 };
 
-/// Fill in S^-1 of the factors (m, 2, b, b) of meetings, whose neighbours have the factors `before`
-/// and `after`.
+/// Fill in S^-1 of the factors (2 m, b, b) of meetings, part by part, whose neighbours have the
+/// factors `before` and `after`.
 void join(std::span<const Meeting> meetings, const StationBlocks& blocks,
-          Array4<const double> before, Array4<const double> after, Array4<double> factors);
+          Array3<const double> before, Array3<const double> after, Array3<double> factors);
 
 /// Spacing of the stations where elimination may end, if it may at several.
 constexpr int64_t kMiddles = 16;

@@ -16,6 +16,7 @@
 // in the end: of both, kinds 0 and 1 are enough. The mask of a block lists its products: the
 // others are neither stored nor multiplied.
 #include <array>
+#include <bit>
 #include <cstdint>
 
 #include "base/side_by_side.hpp"
@@ -100,8 +101,7 @@ constexpr Mask upper(const Mask& mask) {
 constexpr int n_products(const Mask& mask) {
     int n = 0;
     for (const auto& row : mask)
-        for (int kinds : row)
-            for (; kinds; kinds &= kinds - 1) ++n;
+        for (const uint8_t kinds : row) n += std::popcount(kinds);
     return n;
 }
 constexpr bool holds(const Mask& mask, const Mask& other) {

@@ -31,9 +31,9 @@ Line::Line(std::vector<std::unique_ptr<Kernels>> kernels,
 void Line::set_runs(const Work& work, int64_t n, int64_t low) {
     runs_.clear();
     run_number_.clear();
-    const Places &solved = work.factored.places, &read = work.product.places;
+    const Sections &solved = work.factored.places, &read = work.product.places;
     const int64_t first = work.product.first;
-    if (!solved.station_type) {
+    if (solved.starts.empty()) {
         const int64_t pitch = kernels_[0]->rows.unknowns * scenes_;
         // There is one station more to be read at both ends.
         runs_.push_back({-1, n + 1, pitch * first, 0, -pitch * low});
@@ -47,20 +47,20 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
             run_number_[end] = static_cast<int32_t>(runs_.size());
         const int64_t before = kernels_[solved.station_type[begin]]->rows.unknowns * begin;
         const int64_t here = solved.starts[begin] - before;
-        const int64_t by_read = read.starts ? read.starts[first + begin] - before : 0;
+        const int64_t by_read = read.starts.empty() ? 0 : read.starts[first + begin] - before;
         const int64_t own = here - solved.starts[low];
         runs_.push_back({begin, end, by_read * scenes_, here * scenes_, own * scenes_});
     }
-    auto end_of = [&](const Places& places, int64_t last) {
+    auto end_of = [&](const Sections& places, int64_t last) {
         const size_t unknowns = station_types_.at(places.station_type[last]).size();
         return (places.starts[last] + static_cast<int64_t>(unknowns)) * scenes_;
     };
     n_solved_ = n > 0 ? end_of(solved, n - 1) : 0;
-    n_read_ = read.starts ? end_of(read, first + n) : 0;
+    n_read_ = read.starts.empty() ? 0 : end_of(read, first + n);
 }
 
 int64_t Line::start_of(const Work& work, int64_t station) const {
-    if (!work.factored.places.starts) return kernels_[0]->rows.unknowns * scenes_ * station;
+    if (work.factored.places.starts.empty()) return kernels_[0]->rows.unknowns * scenes_ * station;
     const bool is_end = station == static_cast<int64_t>(run_number_.size());
     return is_end ? n_solved_ : work.factored.places.starts[station] * scenes_;
 }
@@ -143,11 +143,9 @@ void Line::take(const Work& work, bool forth, Way& one, Way* other) const {
         if (forth) put_outside(work, way->chain, here, way->step);
     }
     const Kernels& kernels = *kernels_[one.station_type];
-    if (other)
-        forth ? kernels.forth(work, one.chain, other->chain)
-              : kernels.back(work, one.chain, other->chain);
-    else
-        forth ? kernels.forth(work, one.chain, one.step) : kernels.back(work, one.chain, one.step);
+    Chain* const second = other ? &other->chain : nullptr;
+    forth ? kernels.forth(work, one.chain, one.step, second)
+          : kernels.back(work, one.chain, one.step, second);
     for (Way* way : {&one, other}) {
         if (!way) continue;
         way->next += way->step * way->chain.n;

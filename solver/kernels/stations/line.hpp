@@ -30,24 +30,26 @@ struct Table {
     const double* at(int64_t station) const { return numbers + begins[station]; }
 };
 
-/// Begins of stations in vectors, and the station type of each; null if all are alike.
-struct Places {
-    const int64_t* starts = nullptr;
-    const uint8_t* station_type = nullptr;
+/// Begins of stations in vectors, and the station type of each; both empty if all are alike.
+struct Sections {
+    std::span<const int64_t> starts;
+    std::span<const uint8_t> station_type;
+    CATENARY_RECORD(starts, station_type)
+    CATENARY_SHAPES("n, n")
 };
 
 /// Operands of a product. Station i of the line is `first` + i of `places`.
 struct Product {
     Table rows;
     int64_t first = 0;
-    Places places;
+    Sections places;
     const double *factor = nullptr, *velocity = nullptr;
 };
 
 struct Factored {
     Table inverse;  ///< S^-1 alone if factors are sparse, else -B^T S^-1 as well
     Table beside;   ///< the matrix's own blocks B
-    Places places;
+    Sections places;
 };
 
 /// Stations that a step solves for, stations that it moves, and where elimination ends.
@@ -116,15 +118,13 @@ class Kernels {
     virtual ~Kernels() = default;
     /// Rows of a product with K, and -C.
     virtual void multiply(const Work&, const Chain&, double* result) const = 0;
-    /// The pass forth through one chain, whose next station is a `step` of 1 or -1 further, or
-    /// through two of equal length.
-    virtual void forth(const Work&, Chain&, int step) const = 0;
-    virtual void forth(const Work&, Chain& from_start, Chain& from_end) const = 0;
+    /// The pass forth through one chain, whose next station is a `step` of 1 or -1 further, and
+    /// through another of equal length, if there is one, the other way: the first from the start.
+    virtual void forth(const Work&, Chain& one, int step, Chain* other) const = 0;
     /// Solve for the station where both chains meet.
     virtual void meet(const Work&, const Run&, int64_t middle, Station& from_end) const = 0;
-    /// The pass back.
-    virtual void back(const Work&, Chain&, int step) const = 0;
-    virtual void back(const Work&, Chain& to_start, Chain& to_end) const = 0;
+    /// The pass back; of two chains the first goes to the start.
+    virtual void back(const Work&, Chain& one, int step, Chain* other) const = 0;
 
     const Layout rows, factors;
 };
@@ -177,8 +177,8 @@ class Line {
         return runs_[run_number_.empty() ? 0 : run_number_[station]];
     }
     int station_type(const Work& work, int64_t station) const {
-        const uint8_t* of = work.factored.places.station_type;
-        return of ? of[station] : 0;
+        const auto of = work.factored.places.station_type;
+        return of.empty() ? 0 : of[station];
     }
     struct Way;
     bool alike(int one, int other) const;

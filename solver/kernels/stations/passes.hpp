@@ -295,16 +295,11 @@ class KernelsOf final : public Kernels {
     void multiply(const Work& work, const Chain& chain, double* result) const override {
         multiply_rows(blocks_, work, chain, result);
     }
-    void forth(const Work& work, Chain& chain, int step) const override {
-        go_forth(blocks_, work, chain, step, is_given(work));
-    }
-    void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
-        if constexpr (kSideBySide) {
-            go_forth(blocks_, work, from_start, from_end, is_given(work));
-        } else {
-            forth(work, from_start, 1);
-            forth(work, from_end, -1);
-        }
+    void forth(const Work& work, Chain& one, int step, Chain* other) const override {
+        if constexpr (kSideBySide)
+            if (other) return go_forth(blocks_, work, one, *other, is_given(work));
+        go_forth(blocks_, work, one, step, is_given(work));
+        if (other) go_forth(blocks_, work, *other, -step, is_given(work));
     }
     void meet(const Work& work, const Run& run, int64_t middle, Station& from_end) const override {
         const Chained<Blocks> one(blocks_, work, run);
@@ -312,16 +307,11 @@ class KernelsOf final : public Kernels {
         blocks_.store(from_end.unknowns, own);
         if (!is_given(work)) one.go_on(middle, own, then(work));
     }
-    void back(const Work& work, Chain& chain, int step) const override {
-        go_back(blocks_, work, chain, step, then(work));
-    }
-    void back(const Work& work, Chain& to_start, Chain& to_end) const override {
-        if constexpr (kSideBySide) {
-            go_back(blocks_, work, to_start, to_end, then(work));
-        } else {
-            back(work, to_start, -1);
-            back(work, to_end, 1);
-        }
+    void back(const Work& work, Chain& one, int step, Chain* other) const override {
+        if constexpr (kSideBySide)
+            if (other) return go_back(blocks_, work, one, *other, then(work));
+        go_back(blocks_, work, one, step, then(work));
+        if (other) go_back(blocks_, work, *other, -step, then(work));
     }
 
   private:
@@ -354,27 +344,21 @@ class QuickKernels final : public Kernels {
     void multiply(const Work& work, const Chain& chain, double* result) const override {
         multiply_rows(blocks_, work, chain, result);
     }
-    void forth(const Work& work, Chain& chain, int step) const override {
+    void forth(const Work& work, Chain& one, int step, Chain* other) const override {
+        if (other && !work.right) return go_forth(blocks_, work, one, *other, IsProduct{});
         if constexpr (IsMixed)
-            if (!work.right) return go_forth(blocks_, work, chain, step, IsProduct{});
-        rest_->forth(work, chain, step);
-    }
-    void forth(const Work& work, Chain& from_start, Chain& from_end) const override {
-        work.right ? rest_->forth(work, from_start, from_end)
-                   : go_forth(blocks_, work, from_start, from_end, IsProduct{});
+            if (!work.right) return go_forth(blocks_, work, one, step, IsProduct{});
+        rest_->forth(work, one, step, other);
     }
     void meet(const Work& work, const Run& run, int64_t middle, Station& from_end) const override {
         rest_->meet(work, run, middle, from_end);
     }
-    void back(const Work& work, Chain& chain, int step) const override {
+    void back(const Work& work, Chain& one, int step, Chain* other) const override {
+        const bool is_newmark = then_of(work) == Then::kNewmark;
+        if (other && is_newmark) return go_back(blocks_, work, one, *other, Newmark{});
         if constexpr (IsMixed)
-            if (then_of(work) == Then::kNewmark)
-                return go_back(blocks_, work, chain, step, Newmark{});
-        rest_->back(work, chain, step);
-    }
-    void back(const Work& work, Chain& to_start, Chain& to_end) const override {
-        then_of(work) == Then::kNewmark ? go_back(blocks_, work, to_start, to_end, Newmark{})
-                                        : rest_->back(work, to_start, to_end);
+            if (is_newmark) return go_back(blocks_, work, one, step, Newmark{});
+        rest_->back(work, one, step, other);
     }
 
   private:

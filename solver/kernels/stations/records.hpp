@@ -8,18 +8,6 @@
 
 namespace catenary {
 
-/// Begins of stations in vectors, and the station type of each; both empty if all are alike.
-struct Sections {
-    std::span<const int64_t> starts;
-    std::span<const uint8_t> station_type;
-    CATENARY_RECORD(starts, station_type)
-    CATENARY_SHAPES("n, n")
-
-    Places places() const {
-        return starts.empty() ? Places{} : Places{starts.data(), station_type.data()};
-    }
-};
-
 /// Throws std::invalid_argument unless `numbers` hold those of each station from its one of
 /// `begins` on, of which a station of type t has sizes[t].
 inline void check_table(std::span<const int32_t> begins, std::span<const double> numbers,
@@ -52,7 +40,7 @@ struct ProductArrays {
                             layout.pieces().vector());
         const auto types = sections.station_type;
         check_table(kinds, blocks, types.empty() ? types : part(types, first, size(types)), sizes);
-        return {.rows = {kinds.data(), blocks.data()}, .first = first, .places = sections.places()};
+        return {.rows = {kinds.data(), blocks.data()}, .first = first, .places = sections};
     }
 };
 
@@ -78,9 +66,7 @@ struct FactorArrays {
         }
         check_table(kinds, blocks, sections.station_type, inverse);
         check_table(beside_kinds, besides, sections.station_type, besides_of_both);
-        return {{kinds.data(), blocks.data()},
-                {beside_kinds.data(), besides.data()},
-                sections.places()};
+        return {{kinds.data(), blocks.data()}, {beside_kinds.data(), besides.data()}, sections};
     }
     const Ends& at() const { return *reinterpret_cast<const Ends*>(ends.data()); }
 };

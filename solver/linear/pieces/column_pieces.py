@@ -41,66 +41,39 @@ def columns_of(
         Function that is called with all columns and the numbers of the places that have
         theirs now.
     """
-    if operators is not None:
-        return ColumnPieces(responses, operators, places, made).columns
-    columns = responses.columns(*places)
-    made(columns, np.arange(columns.start.size))
-    return columns
+    if operators is None:
+        columns = responses.columns(*places)
+        made(columns, np.arange(columns.start.size))
+        return columns
+    found, reach = responses.places(*places)
+    x, pieces = found.x, operators.pieces
+    # Places in their order along the track, and which of them are before each piece.
+    order = np.argsort(x, kind="stable")
+    edges = responses.windows.numbering.low[pieces.edges[1:-1]]
+    ends = np.concatenate([[0], np.searchsorted(x[order], edges), [x.size]])
+    sizes = np.cumsum(np.append(0, found.dofs.shape[1] * found.width[order]))
+    room = int(np.diff(sizes[ends]).max(initial=0))
+    at, data = np.zeros(x.size, dtype=np.int64), np.zeros(pieces.n_slots * room)
+    columns = ShortColumns(found.begin, at, found.width, data, reach)
 
-
-class ColumnPieces:
-    """Columns of a table of places, made by pieces. Not collective.
-
-    Attributes
-    ----------
-    columns : ShortColumns, whose arrays are filled in place
-
-    Parameters
-    ----------
-    responses : solver for columns
-    operators : of the line, whose pieces these are
-    places, made : as of ``columns_of``
-    """
-
-    def __init__(
-        self,
-        responses: UnitResponses,
-        operators: OperatorPieces,
-        places: tuple[np.ndarray, ...],
-        made: Made,
-    ) -> None:
-        self._responses, self._operators, self._made = responses, operators, made
-        self._places, reach = responses.places(*places)
-        x, n_forces = self._places.x, self._places.dofs.shape[1]
-        pieces, low = operators.pieces, responses.windows.numbering.low
-        # Places in their order along the track, and which of them are before each piece.
-        self._order = np.argsort(x, kind="stable")
-        ends = np.searchsorted(x[self._order], low[pieces.edges[1:-1]])
-        self._ends = np.concatenate([[0], ends, [x.size]])
-        sizes = np.cumsum(np.append(0, n_forces * self._places.width[self._order]))
-        self._room = int(np.diff(sizes[self._ends]).max(initial=0))
-        self._size = pieces.size
-        at, data = np.zeros(x.size, dtype=np.int64), np.zeros(pieces.n_slots * self._room)
-        self.columns = ShortColumns(self._places.begin, at, self._places.width, data, reach)
-        pieces.add(self._make)
-
-    def _make(self, piece: Piece) -> None:
-        number = piece.begin // self._size
-        which = self._order[self._ends[number] : self._ends[number + 1]]
+    def make(piece: Piece) -> None:
+        number = piece.begin // pieces.size
+        which = order[ends[number] : ends[number + 1]]
         if not which.size:
             return
-        columns, first = self.columns, piece.slot * self._room
-        like = self._operators.like
-        places = Places(*(part[which] for part in self._places))
+        own = Places(*(part[which] for part in found))
         try:
             # Room and reach are those of all pieces.
-            at, data = self._responses.solve(places, like, columns.reach, FELT_AT_MOST)
+            begins, numbers = responses.solve(own, operators.like, reach, FELT_AT_MOST)
         except FeltFurther as error:
             raise RunBroken(
-                f"near {places.x.mean():.0f} m a force moves the line beyond the "
-                f"{columns.reach:.0f} m that it reaches at the start, which a window cannot "
-                "follow; set window.mode to off"
+                f"near {own.x.mean():.0f} m a force moves the line beyond the {reach:.0f} m that "
+                "it reaches at the start, which a window cannot follow; set window.mode to off"
             ) from error
-        columns.at[which] = first + at
-        columns.data[first : first + data.size] = data
-        self._made(columns, which)
+        first = piece.slot * room
+        at[which] = first + begins
+        data[first : first + numbers.size] = numbers
+        made(columns, which)
+
+    pieces.add(make)
+    return columns

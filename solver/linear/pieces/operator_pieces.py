@@ -70,7 +70,7 @@ class FactorPieces:
         here = np.zeros(-(-n // MIDDLES), dtype=np.int32)
         self._turning = native.Turning(kinds.copy(), kinds.copy(), here)
         self.factors = StationFactors(
-            layout, stations, kinds, self._blocks.numbers, 0, n, 0, besides, self._turning
+            layout, stations, kinds, self._blocks.numbers, besides, 0, n, self._turning
         )
 
     def make(self, piece: Piece, rows: StationRows) -> None:
@@ -91,7 +91,7 @@ class FactorPieces:
         if not np.isfinite(found.factors).all():
             raise RunBroken("the step operator cannot be factored: it is singular or not finite")
         station_type = stations.station_type[whole.chosen][found.kinds]
-        kinds, packed, _ = packed_factors(self._layout, station_type, found)
+        kinds, packed = packed_factors(self._layout, station_type, found)
         kinds, size = kinds[place] + self._blocks.put(piece.slot, packed), piece.end - piece.begin
         begin, end, turning = piece.begin, piece.end, self._turning
         turning.to_end[begin:end], turning.to_start[begin:end] = kinds[: 2 * size].reshape(2, -1)
@@ -101,11 +101,12 @@ class FactorPieces:
         if besides is None:
             raise RunBroken(JOINED_OTHERWISE)
         first = self._besides.put(piece.slot, besides[1])
-        self.factors.beside_kinds[begin:end] = besides[0] + first
+        self.factors.arrays.beside_kinds[begin:end] = besides[0] + first
 
     def _turn(self, piece: Piece) -> None:
         """Give the stations of a piece the factors for where elimination ends now."""
-        kinds, turning, ends_at = self.factors.kinds, self._turning, int(self.factors.ends[4])
+        arrays, turning = self.factors.arrays, self._turning
+        kinds, ends_at = arrays.kinds, int(arrays.ends[4])
         middle = min(max(ends_at, piece.begin), piece.end)
         kinds[piece.begin : middle] = turning.to_end[piece.begin : middle]
         kinds[middle : piece.end] = turning.to_start[middle : piece.end]
@@ -190,7 +191,7 @@ class OperatorPieces:
         widths = tuple(sets * part.native.row_size for part in layout.parts)
         table = Slots(pieces.n_slots, pieces.size, widths)
         kinds = np.zeros(self._stations.size, dtype=np.int32)
-        product = StationProduct(layout, stations, kinds, table.numbers, 1, 0)
+        product = StationProduct(layout, stations, kinds, table.numbers, 1)
         self._products.append((table, product, of, damping))
         return product
 
@@ -205,8 +206,8 @@ class OperatorPieces:
             packed = packed_rows(product.layout, own, damped, part)
             if packed is None:
                 raise RunBroken(JOINED_OTHERWISE)
-            kinds, numbers, _ = packed
-            product.kinds[piece.begin : piece.end] = kinds + table.put(piece.slot, numbers)
+            kinds, numbers = packed
+            product.arrays.kinds[piece.begin : piece.end] = kinds + table.put(piece.slot, numbers)
 
 
 def rows_on(

@@ -18,8 +18,6 @@ from catenary.solver.model.model import Block, Model
 # Odd numbers without a pattern: of Knuth's linear congruential generator and of SplitMix64.
 _RATIO = 6364136223846793005
 _FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
-# Sums of parts of so many bits are exact in float64, of up to 2^32 of them.
-_BITS = 21
 
 
 class LikeStations:
@@ -48,7 +46,7 @@ class LikeStations:
         # Unknowns of a station differ by their place in it and by whether they are held.
         name = (2 * (np.arange(low, high) - starts[station]) + held).astype(np.uint64)
         self.marks = _mixed(numbering.station_type[first:last].astype(np.uint64))
-        self.marks += _sums(station[constrained], _mixed(name[constrained]), n)
+        np.add.at(self.marks, station[constrained], _mixed(name[constrained]))
         for number, block in enumerate(model.blocks):
             dofs, kind, table = _elements_between(block, low, high)
             if not dofs.size:
@@ -60,7 +58,7 @@ class LikeStations:
             for column in range(at.shape[1]):
                 element = _mixed(element + own[:, column] + (apart[:, column] << np.uint64(16)))
             for column in range(at.shape[1]):
-                self.marks += _sums(at[:, column], _mixed(element + np.uint64(column)), n)
+                np.add.at(self.marks, at[:, column], _mixed(element + np.uint64(column)))
 
     def fingerprints(self, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         """A number (k,) uint64 for each stretch from station ``first`` (k,) to before ``last``
@@ -102,12 +100,3 @@ def _mixed(numbers: np.ndarray) -> np.ndarray:
     numbers = (numbers ^ (numbers >> np.uint64(30))) * _FIRST
     numbers = (numbers ^ (numbers >> np.uint64(27))) * _SECOND
     return np.asarray(numbers ^ (numbers >> np.uint64(31)))
-
-
-def _sums(at: np.ndarray, numbers: np.ndarray, n: int) -> np.ndarray:
-    """Sums (n,) uint64, modulo 2^64, of the ``numbers`` (k,) of each place ``at`` (k,)."""
-    result = np.zeros(n, dtype=np.uint64)
-    for shift in map(np.uint64, range(0, 64, _BITS)):
-        part = (numbers >> shift) & np.uint64(2**_BITS - 1)
-        result += np.bincount(at, weights=part, minlength=n).astype(np.uint64) << shift
-    return result

@@ -6,8 +6,9 @@ is known to them alone (``layout.hpp``).
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -15,16 +16,15 @@ from catenary.solver.kernels import native
 
 # Unknowns of a station that kernels take.
 MOST_UNKNOWNS = native.MOST_UNKNOWNS
-# Parameters of a layout.
-_SETTINGS = ("widths", "own", "beside", "damped", "station_types", "factors")
 
 
+@dataclass(eq=False)
 class Layout:
     """Sparsity pattern of a station's blocks in K and C, or in factors of A.
 
     Planes are sets of unknowns that no matrix joins. They stand side by side.
 
-    Parameters
+    Attributes
     ----------
     widths : unknowns of a station in each plane, as they follow each other in vectors
     own, beside : (b, b) bool, pattern of the block of a station, and of the blocks between
@@ -34,38 +34,28 @@ class Layout:
     factors : whether of factors
     station_types : places in a cross-section that stations of each type have; empty if all stations
         have all places
-
-    Attributes
-    ----------
-    pitch : unknowns of a cross-section
     whole, places : for one of the ``parts`` of a layout: that layout, and the places that the part
         has of it
     """
 
+    widths: tuple[int, ...]
+    own: np.ndarray = field(default_factory=lambda: np.array(True))
+    beside: np.ndarray = field(default_factory=lambda: np.array(True))
+    damped: bool = False
+    station_types: tuple[tuple[int, ...], ...] = ()
+    factors: bool = False
     whole: Layout | None = None
     places: tuple[int, ...] = ()
 
-    def __init__(
-        self,
-        widths: tuple[int, ...],
-        own: np.ndarray | None = None,
-        beside: np.ndarray | None = None,
-        damped: bool = False,
-        station_types: tuple[tuple[int, ...], ...] = (),
-        factors: bool = False,
-    ) -> None:
-        self.widths = tuple(widths)
-        plane = np.repeat(np.arange(len(widths)), widths)
-        self._plane = plane
+    def __post_init__(self) -> None:
+        self._plane = plane = np.repeat(np.arange(len(self.widths)), self.widths)
         together = plane[:, None] == plane
-        self.own = together if own is None else own & together
-        self.beside = together if beside is None else beside & together
-        self.damped, self.station_types, self.factors = bool(damped), station_types, bool(factors)
-        self.pitch = plane.size
+        self.own, self.beside = self.own & together, self.beside & together
 
-    def changed(self, **settings: Any) -> Layout:
-        """Return this layout with some other parameters, by their names."""
-        return Layout(**{**{name: getattr(self, name) for name in _SETTINGS}, **settings})
+    @property
+    def pitch(self) -> int:
+        """Unknowns of a cross-section."""
+        return self._plane.size
 
     @property
     def varies(self) -> bool:
@@ -81,9 +71,15 @@ class Layout:
         places = self.station_types[number]
         widths = tuple(int(width) for width in np.bincount(self._plane[list(places)]) if width)
         own, beside = (joined[np.ix_(places, places)] for joined in (self.own, self.beside))
-        part = Layout(widths, own, beside, self.damped, factors=self.factors)
-        part.whole, part.places = self, places
-        return part
+        return replace(
+            self,
+            widths=widths,
+            own=own,
+            beside=beside,
+            station_types=(),
+            whole=self,
+            places=places,
+        )
 
     @cached_property
     def native(self) -> native.Layout:

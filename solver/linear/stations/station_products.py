@@ -9,6 +9,7 @@ memory. Where no two spans are alike, blocks are read one after the other, as me
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -46,13 +47,13 @@ def of_pairs(size: int) -> np.ndarray:
 def with_damping(layout: Layout, damping: np.ndarray | None) -> Layout:
     """Extend a layout to products with C, whose blocks are ``damping``, see ``neighbours``."""
     found = layout if damping is None else joining(layout, damping)
-    return found.changed(damped=True)
+    return replace(found, damped=True)
 
 
 def joining(layout: Layout, blocks: np.ndarray) -> Layout:
     """Extend a layout to a matrix with ``blocks`` (3, n, b, b), see ``neighbours``."""
     before, own, after = (blocks != 0).any(axis=1)
-    return layout.changed(own=layout.own | own, beside=layout.beside | before | after)
+    return replace(layout, own=layout.own | own, beside=layout.beside | before | after)
 
 
 def _planes(joined: np.ndarray) -> tuple[int, ...]:
@@ -65,7 +66,7 @@ def _planes(joined: np.ndarray) -> tuple[int, ...]:
 
 def kinds_by_type(
     layout: Layout, station_type: np.ndarray, pack: Callable[[Layout, Any], np.ndarray]
-) -> tuple[np.ndarray, np.ndarray, int, int]:
+) -> tuple[np.ndarray, np.ndarray, int]:
     """Different rows of numbers of stations, each stored once.
 
     ``station_type`` (n,) is the type of each station; ``pack(layout, stations)`` returns the
@@ -75,11 +76,10 @@ def kinds_by_type(
     -------
     kinds : (n,) int32, place of the first number of each station in ``numbers``
     numbers : numbers of all kinds, one kind after another
-    n_kinds : number of kinds
     count : number of non-zero numbers of all stations, before like ones are merged
     """
     begins, numbers = np.zeros(station_type.size, dtype=np.int32), [np.zeros(0)]
-    end = n_kinds = count = 0
+    end = count = 0
     # Blocks of large vectors begin at lines of a cache if those of small ones stand behind them.
     for number in sorted(range(len(layout.parts)), key=lambda n: -layout.parts[n].pitch):
         stations = np.flatnonzero(station_type == number) if layout.varies else slice(None)
@@ -89,8 +89,7 @@ def kinds_by_type(
         begins[stations] = end + packed.shape[1] * kinds
         numbers.append(packed[first].ravel())
         end += numbers[-1].size
-        n_kinds += first.size
-    return begins, aligned_arrays.copy(np.concatenate(numbers)), n_kinds, count
+    return begins, aligned_arrays.copy(np.concatenate(numbers)), count
 
 
 class StationProduct:
@@ -100,26 +99,21 @@ class StationProduct:
     ----------
     layout : Layout
     stations : of the factor
+    arrays : ``native.ProductArrays``
+
+    Parameters
+    ----------
     kinds : (n,) of its rows, see ``kinds_by_type``
     blocks : of each kind the diagonal block of K, then what joins it to the stations before and
         after it; the same of -C; all as products read them, see ``Layout``
     first : station in the factor of the first row; the factor has one before and one after all
         rows, which is zero where the line ends
-    n_kinds : how many rows are different
-    arrays : ``native.ProductArrays``
     """
 
     def __init__(
-        self,
-        layout: Layout,
-        stations: Sections,
-        kinds: np.ndarray,
-        blocks: np.ndarray,
-        first: int,
-        n_kinds: int,
+        self, layout: Layout, stations: Sections, kinds: np.ndarray, blocks: np.ndarray, first: int
     ) -> None:
-        self.layout, self.stations, self.kinds = layout, stations, kinds
-        self.blocks, self.first, self.n_kinds = blocks, first, n_kinds
+        self.layout, self.stations = layout, stations
         self.arrays = native.ProductArrays(kinds, blocks, first, stations.places())
 
     @cached_property
@@ -132,7 +126,7 @@ class StationProduct:
     ) -> None:
         """Make ``result`` K ``factor``, less C ``velocity`` if the layout is damped."""
         velocity = factor if velocity is None else velocity
-        self._products.multiply(0, self.kinds.size, factor, velocity, result)
+        self._products.multiply(0, self.arrays.kinds.size, factor, velocity, result)
 
     def multiply_rows(self, begin: int, end: int, factor: np.ndarray, result: np.ndarray) -> None:
         """Write the rows of the stations from ``begin`` to before ``end`` of K ``factor`` to
@@ -167,14 +161,13 @@ def station_product(
     packed = packed_rows(layout, rows, damping, of_rows)
     if packed is None:
         return None
-    kinds, numbers, n_kinds = packed
-    return StationProduct(layout, stations, kinds, numbers, first, n_kinds)
+    return StationProduct(layout, stations, *packed, first)
 
 
 def packed_rows(
     layout: Layout, rows: StationRows, damping: StationRows | None, station_type: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, int] | None:
-    """Kinds and numbers of rows as ``StationProduct`` keeps them, and the number of kinds.
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Kinds and numbers of rows as ``StationProduct`` keeps them.
 
     ``station_type`` (n,) is the type of each row; None if a matrix has entries outside of the
     layout.
@@ -189,7 +182,7 @@ def packed_rows(
         packed = [part.packed(blocks[which], place) for blocks, place in numbers]
         return np.concatenate(packed, axis=1)
 
-    kinds, packed, n_kinds, count = kinds_by_type(layout, station_type[rows.chosen], pack)
+    kinds, packed, count = kinds_by_type(layout, station_type[rows.chosen], pack)
     if count != sum(np.count_nonzero(blocks) for blocks, _ in numbers):
         return None
-    return kinds[rows.kinds], packed, n_kinds
+    return kinds[rows.kinds], packed

@@ -61,25 +61,17 @@ class LikeRows:
         marks[-1:] += np.uint64(2)
         self._chosen, self._kinds = numbered(marks)
 
-    def sum_of(
-        self, of: Coefficients, columns: tuple[int, int], held_diagonal: float = 0.0
-    ) -> StationRows | None:
-        """Rows of a sum of M, K and C; None if it joins stations that are no neighbours.
-
-        Entries beyond ``columns`` are left out; those of held unknowns are zero but for
-        ``held_diagonal``.
-        """
-        found = self.sums_of([of], columns, [held_diagonal])
-        return None if found is None else found[0]
-
     def sums_of(
         self,
         sums: Sequence[Coefficients],
         columns: tuple[int, int],
         held_diagonals: Sequence[float],
     ) -> list[StationRows] | None:
-        """``sum_of`` for several ``sums`` at once, each with its held diagonal; None if one joins
-        stations that are no neighbours."""
+        """Rows of ``sums`` of M, K and C; None if one joins stations that are no neighbours.
+
+        Entries beyond ``columns`` are left out; those of held unknowns are zero but for the
+        diagonal of each sum in ``held_diagonals``.
+        """
         width = self._model.numbering.width
         blocks = np.zeros((len(sums), 3, self._chosen.size, width, width))
         for begin in range(0, self._chosen.size, _STRETCH):

@@ -55,14 +55,11 @@ class ObserverList:
     def show(self, view: Callable[[], StepView]) -> None:
         """Show a state to the observers; RunBroken if one cannot go on."""
         if self._observers:
-            self._event.begin()
-            try:
+            with self._event:
                 shown = view()
                 for number, observer in enumerate(self._observers):
                     self._latest[number] = shown.step
                     observer.observe(shown)
-            finally:
-                self._event.end()
         if self._after is not None:
             self._after()
 
@@ -88,8 +85,7 @@ class ObserverList:
         if last == first:
             return
         if self._observers:
-            self._event.begin()
-            try:
+            with self._event:
                 for view in views:
                     step = view.step
                     for number, observer in enumerate(self._observers):
@@ -98,8 +94,6 @@ class ObserverList:
                         since, self._latest[number] = self._latest[number] - first, step
                         view.move_to(step, times[since : step - first], rows[since : step - first])
                         observer.observe(view)
-            finally:
-                self._event.end()
         if self._after is not None:
             self._after()
 

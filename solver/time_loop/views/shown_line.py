@@ -131,7 +131,7 @@ class LineEnergy:
         # Without a window the line is one station, of which a product has many rows.
         self._rows = self._edges
         if not in_parts and self._products is not None:
-            self._rows = np.array([0, self._products[0].kinds.size])
+            self._rows = np.array([0, self._products[0].arrays.kinds.size])
         stations = None if line.window is None else line.window.stations
         self._of_links = columns_of((links.links.unknowns,), n, stations)
         self._force = np.zeros(n)
@@ -158,8 +158,9 @@ class LineEnergy:
         else:
             if begin < end:
                 # Rows that join two stations change with either.
-                changed = max(self._first, begin - 1), min(int(self._edges[-1]), end + 1)
-                self._sum_stations(motion.padded, (displacement, velocity), *changed)
+                self._sum_stations(
+                    motion, max(self._first, begin - 1), min(int(self._edges[-1]), end + 1)
+                )
             parts = 0.5 * np.add.reduce(self._sums, axis=1)
         if begin < end:
             self._sum_links(displacement, begin, end)
@@ -180,50 +181,32 @@ class LineEnergy:
         self._first_link = int(self._of_links.first[self._first, 0])
         self._switched[: self._first_link // self._links_size] = 0.0
 
-    def _sum_stations(
-        self,
-        padded: tuple[np.ndarray, ...],
-        motion: tuple[np.ndarray, np.ndarray],
-        begin: int,
-        end: int,
-    ) -> None:
-        assert self._products is not None
-        if self._edges.size == 2:
-            for row, product in enumerate(self._products[:2]):
-                product.multiply_rows(0, int(self._rows[1]), padded[1 - row], self._force)
-                self._force[: int(self._station_starts[self._first])] = 0.0
-                self._sums[row, 0] = self._force @ motion[1 - row]
-            return
-        assert self._line.window is not None
-        together = max(1, (self._line.window.most_rows - 2) // self._size)
-        first, last = begin // self._size, -(-end // self._size)
-        for part in range(first, last, together):
-            self._sum_parts(padded, motion, part, min(part + together, last))
-
-    def _sum_parts(
-        self,
-        padded: tuple[np.ndarray, ...],
-        motion: tuple[np.ndarray, np.ndarray],
-        first: int,
-        last: int,
-    ) -> None:
-        """Sum the parts from ``first`` to before ``last``."""
-        assert self._products is not None and self._line.window is not None
+    def _sum_stations(self, motion: ShownMotion, begin: int, end: int) -> None:
         window = self._line.window
-        if not window.has_rows(*self._rows[[first, last]].tolist()):
+        first, last = begin // self._size, -(-end // self._size)
+        together = last if window is None else max(1, (window.most_rows - 2) // self._size)
+        for part in range(first, last, together):
+            self._sum_parts(motion, part, min(part + together, last))
+
+    def _sum_parts(self, motion: ShownMotion, first: int, last: int) -> None:
+        """Sum the parts from ``first`` to before ``last``."""
+        assert self._products is not None
+        window, both = self._line.window, (motion.displacement, motion.velocity)
+        if window is not None and not window.has_rows(*self._rows[[first, last]].tolist()):
             # Stations that have not moved need no rows.
             own = slice(*self._starts[[first, last]].tolist())
             self._sums[:, first:last] = 0.0
-            moved = own.start + np.flatnonzero((motion[0][own] != 0) | (motion[1][own] != 0))
+            moved = own.start + np.flatnonzero((both[0][own] != 0) | (both[1][own] != 0))
             if not moved.size:
                 return
             first, last = np.searchsorted(self._starts, moved[[0, -1]], side="right") + (-1, 0)
         begin, end = self._rows[[first, last]].tolist()
         own = slice(*self._starts[[first, last]].tolist())
-        window.provide_rows(begin, end)
+        if window is not None:
+            window.provide_rows(begin, end)
         for row, product in enumerate(self._products[:2]):
             # The kinetic energy is that of the velocity.
-            factor, values = padded[1 - row], motion[1 - row][own]
+            factor, values = motion.padded[1 - row], both[1 - row][own]
             product.multiply_rows(begin, end, factor, self._force)
             force = self._force[own]
             force[: max(0, int(self._station_starts[self._first]) - own.start)] = 0.0

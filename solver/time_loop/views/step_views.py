@@ -97,7 +97,20 @@ class Showing:
         self._rows_of_unknown: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._kept_places = np.zeros(0)
         self._row, self._times = np.zeros(self.layout.width), np.zeros(1)
-        self._view = self._new_view()
+        # The view of all steps, whose step, time and row are set for each.
+        self._view = StepView(
+            step=0,
+            time=0.0,
+            row=self._row,
+            columns=self.layout.columns,
+            node_motion=self._node_motion,
+            wire_tension=lambda: self._tension,
+            pantograph_places=self._pantograph_places,
+            line_state=self._line_state,
+            energies=self._energies,
+            contact_work=self._contact_work,
+            state=self._state,
+        )
         links = droppers, others, dropper_bends, other_bends
         window, n_local = self._line.window, self._line.ownership.n_local
         # Values of the line in a row, and the stations with which they change.
@@ -113,22 +126,6 @@ class Showing:
         self.motion = ShownMotion(self._line, columns, self._energy.pad)
         n = columns.n_stations
         self._show = native.show.bound(self.shown, uplift, tension, 0, n)
-
-    def _new_view(self) -> StepView:
-        """The view of all steps, whose step, time and row are set for each."""
-        return StepView(
-            step=0,
-            time=0.0,
-            row=self._row,
-            columns=self.layout.columns,
-            node_motion=self._node_motion,
-            wire_tension=lambda: self._tension,
-            pantograph_places=self._pantograph_places,
-            line_state=self._line_state,
-            energies=self._energies,
-            contact_work=self._contact_work,
-            state=self._state,
-        )
 
     def stage(self, dt: float, start_time: float, n_steps: int) -> Stage:
         """Facts of a run of ``n_steps`` steps of ``dt`` [s] from ``start_time`` [s]."""
@@ -260,17 +257,13 @@ class Showing:
         tension = np.zeros(mesh.n_nodes)
         for name, nodes in mesh.wires.items():
             tension[nodes] = line.wire(name).tension_at(mesh.x(nodes))
-        return tension + self._gained
-
-    @cached_property
-    def _gained(self) -> np.ndarray:
-        """Tension that another temperature adds to that of the installation [N]."""
-        mesh, gained = self._model.mesh, np.zeros(self._model.mesh.n_nodes)
+        # Another temperature adds to that of the installation.
+        gained = np.zeros(mesh.n_nodes)
         for name, more in self._form.gained_tension.items():
             first, second = mesh.elements(name).T
             gained[second] = more
             gained[first] = more
-        return gained
+        return tension + gained
 
     def _line_state(self) -> Mapping[str, np.ndarray]:
         self._refuse_unseen(_STATE)

@@ -37,7 +37,7 @@ def test_sums_are_those_over_all_the_past(n: int) -> None:
     memory, numbers = loads_of(n, rng)
     domain = Subdomain(0, 12, 0, 12, 0, 12)
     loads = LineLoads([*memory, ShapeLoad(np.array([0, 5]), np.array([2.0, 3.0]))], domain, NOBODY)
-    motion = LineState(*np.zeros((3, 12)), (1.0, 1.0))
+    motion = LineState(*np.zeros((3, 12)), (1.0, 1.0, 1.0))
     loads.read(motion)
     past = rng.normal(size=(n + 1, 12))
     largest = 0.0
@@ -66,7 +66,7 @@ def test_a_past_is_recalled_to_the_last_bit() -> None:
     kept = np.zeros(0)
     for restored in (False, True):
         loads = LineLoads(memory, domain, NOBODY)
-        motion = LineState(*np.zeros((3, 12)), (1.0, 1.0))
+        motion = LineState(*np.zeros((3, 12)), (1.0, 1.0, 1.0))
         loads.read(motion)
         memories = loads.memories
         assert memories is not None

@@ -15,7 +15,7 @@ from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem import complementarity
 from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
-from catenary.solver.contact_problem.law_tangents import HertzInSteps, LinearInSteps
+from catenary.solver.contact_problem.law_tangents import HertzInSteps, LawInSteps
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
 
@@ -52,7 +52,9 @@ class Case:
     coupling: np.ndarray
 
     def solve(self) -> InnerSolution:
-        law = LinearInSteps(self.law, self.heads.n, pulls=not self.may_lose_contact)
+        law = LawInSteps(
+            self.heads.n, self.law.stiffness, self.law.damping, pulls=not self.may_lose_contact
+        )
         return InnerProblem(law, coupled(self.coupling, self.kept)).solve(self.line, self.heads)
 
     def violation(self, found: InnerSolution) -> float:
@@ -161,7 +163,7 @@ def test_a_problem_that_cycles_is_handed_to_the_pivoting() -> None:
     line = LineResponse(0, 3)
     line.count = 3
     line.rows.numbers[:] = np.stack([np.arange(3), -right], axis=1)
-    law = LinearInSteps(LinearLaw(1.0, 0.0), 0, pulls=False)
+    law = LawInSteps(0, 1.0, 0.0, pulls=False)
     found = InnerProblem(law, coupled(np.eye(3) - matrix)).solve(line, Heads(0))
     solutions = []
     for acts in itertools.product([False, True], repeat=3):
@@ -181,7 +183,7 @@ def one_contact(height: float, may_lose_contact: bool = True) -> InnerSolution:
     line.line.place[:], line.line.by_force[:] = height, 3e-5
     heads = Heads(1)
     heads.height_compliance[:] = 2e-5
-    law = LinearInSteps(LinearLaw(5e4, 0.0), 1, pulls=not may_lose_contact)
+    law = LawInSteps(1, 5e4, 0.0, pulls=not may_lose_contact)
     return InnerProblem(law, no_links()).solve(line, heads)
 
 

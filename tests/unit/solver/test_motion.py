@@ -69,6 +69,6 @@ def test_what_is_carried_is_taken_bit_by_bit(state: np.ndarray) -> None:
     for found, expected in zip(other.read[:4], motion.read[:4], strict=True):
         assert np.array_equal(found, expected)
     # A motion that is kept as it is has no use for predictions, and gives none away.
-    plain = LineState(*np.zeros((3, N)), (0.0, 0.0))
+    plain = LineState(*np.zeros((3, N)), (0.0, 0.0, 1.0))
     plain.take(stored)
     assert np.array_equal(plain.displacement, rounded[0]) and not plain.carried()

@@ -46,7 +46,7 @@ def steps(problem: Problem, mesh: LineMesh, window: WindowChoice) -> tuple[Histo
 
     def count(view: object) -> None:
         moving = march._line.window  # noqa: SLF001
-        sizes.append(0 if moving is None else moving.n_stations)
+        sizes.append(0 if moving is None else int(np.diff(moving.arrays.ends[2:4])[0]))
 
     history = History(count)
     try:

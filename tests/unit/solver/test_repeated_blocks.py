@@ -73,8 +73,8 @@ def test_factors_keep_what_is_read_soonest(
     is_wide = widths in ((8,), (10,), (6, 4))
     assert found.layout.native.is_sparse == (is_wide and not joined)
     # Blocks between stations repeat with the line, those after elimination more slowly.
-    assert np.unique(found.beside_kinds).size <= min(n_stations, 10)
-    assert found.kinds.size == n_stations
+    assert np.unique(found.arrays.beside_kinds).size <= min(n_stations, 10)
+    assert found.arrays.kinds.size == n_stations
     compare_factors(n_stations, 0, n_stations, widths, joined)
 
 
@@ -169,8 +169,9 @@ def test_factors_of_a_long_line_are_of_as_many_kinds_as_those_of_a_short_one() -
     short, long = (station_factors(line(n), layout(line(n))) for n in (150, 1500))
     assert short is not None and long is not None
     # The two lines differ; both forget their ends within some ten stations.
-    assert abs(long.n_kinds - short.n_kinds) < 30
-    assert long.n_stations == 1500 and long.n_kinds < 150
+    n_short, n_long = (np.unique(own.arrays.kinds).size for own in (short, long))
+    assert abs(n_long - n_short) < 30
+    assert long.arrays.kinds.size == 1500 and n_long < 150
 
 
 def test_a_line_of_which_no_two_stations_are_alike_keeps_them_in_their_order() -> None:
@@ -180,7 +181,7 @@ def test_a_line_of_which_no_two_stations_are_alike_keeps_them_in_their_order() -
     lanes = layout(alone)
     product, factors = station_product(alone, 0, lanes), station_factors(alone, lanes)
     assert product is not None and factors is not None
-    for kinds in (product.kinds, factors.kinds):
+    for kinds in (product.arrays.kinds, factors.arrays.kinds):
         assert np.array_equal(kinds, kinds[1] * np.arange(n))
     compare_product(alone, 0, lanes)
 

@@ -17,9 +17,8 @@ from catenary.mbs.interface import affine
 from catenary.solver.contact.followed_links import no_links
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem
-from catenary.solver.contact_problem.law_tangents import LinearInSteps
+from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
-from catenary.solver.problem.contact_laws import LinearLaw
 
 N, S, K = 3, 2, 4
 
@@ -27,7 +26,7 @@ N, S, K = 3, 2, 4
 def small_problem() -> object:
     """A small problem of two contacts without links, as kernels solve it."""
     heads, response = affine(np.zeros(12), 2), LineResponse(2, 0)
-    inner = InnerProblem(LinearInSteps(LinearLaw(5e4, 0.0), 2, pulls=False), no_links())
+    inner = InnerProblem(LawInSteps(2, 5e4, 0.0, pulls=False), no_links())
     problem, rows = inner.problem(heads, response), SimpleNamespace(numbers=response.rows.numbers)
     return problem._replace(share=SimpleNamespace(**response.share._asdict() | {"rows": rows}))
 
@@ -138,9 +137,9 @@ def test_a_line_refuses_blocks_that_are_shorter_than_its_rows() -> None:
     product = station_product(matrix, 0, layout(matrix))
     factors = station_factors(matrix, layout(matrix))
     assert product is not None and factors is not None
-    product.arrays = product.arrays._replace(blocks=product.blocks[:-1])
+    product.arrays = product.arrays._replace(blocks=product.arrays.blocks[:-1])
     with pytest.raises(ValueError, match="more numbers than their blocks"):
         product.multiply(np.zeros(28), np.zeros(20))
-    factors.arrays = factors.arrays._replace(besides=factors.besides[:-1])
+    factors.arrays = factors.arrays._replace(besides=factors.arrays.besides[:-1])
     with pytest.raises(ValueError, match="more numbers than their blocks"):
         factors.solve(*np.zeros((2, 20)))

@@ -73,7 +73,7 @@ def compare(
     passes.track_links(links, tension)
     passes.native.step()
     found = motion.displacement, motion.velocity, answer[own], tension
-    plain = LineState(*expected, (0.0, 0.0)).read
+    plain = LineState(*expected, (0.0, 0.0, 1.0)).read
     native.reserves(plain, links, pulls)
     for one, other in zip(found, (*expected, pulls), strict=True):
         assert np.abs(one - other).max(initial=0.0) < ROUND_OFF * np.abs(other).max(initial=1.0)

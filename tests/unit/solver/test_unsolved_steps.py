@@ -19,13 +19,8 @@ from catenary.solver.contact.head_states import Heads
 from catenary.solver.contact.line_response import LineResponse
 from catenary.solver.contact_problem.complementarity import InnerProblem
 from catenary.solver.contact_problem.coupling import Explicit
-from catenary.solver.contact_problem.law_tangents import (
-    HertzInSteps,
-    KinematicInSteps,
-    LawInSteps,
-    LinearInSteps,
-)
-from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
+from catenary.solver.contact_problem.law_tangents import HertzInSteps, KinematicInSteps, LawInSteps
+from catenary.solver.problem.contact_laws import HertzLaw
 from catenary.solver.statics.form_finding.equilibrium import find_form
 
 LINE = en50318_line(2)
@@ -44,7 +39,7 @@ def pressed(
 def test_contacts_without_a_common_solution_are_told() -> None:
     """The convective part of a damper outweighs all else: (1 + k b + c b') f = k d < 0 has f < 0,
     and f = 0 asks for f > 0."""
-    law = LinearInSteps(LinearLaw(1e4, 100.0), 1, pulls=False)
+    law = LawInSteps(1, 1e4, 100.0, pulls=False)
     inner, line, heads = pressed(law, 0.01, 1e-5, rate_by_force=-0.1)
     with pytest.raises(NotConverged, match=r"no common solution; take a smaller numerics\.dt_s"):
         inner.solve(line, heads)
@@ -53,7 +48,7 @@ def test_contacts_without_a_common_solution_are_told() -> None:
 
 def test_a_force_that_is_no_number_is_told_in_its_own_step() -> None:
     """1 + k b + c b' is zero exactly: contact that cannot be lost would have a force of k d / 0."""
-    law = LinearInSteps(LinearLaw(2.0, 1.0), 1, pulls=True)
+    law = LawInSteps(1, 2.0, 1.0, pulls=True)
     inner, line, heads = pressed(law, 0.01, 0.5, rate_by_force=-2.0)
     with pytest.raises(RunBroken, match="no finite solution; try a smaller"):
         inner.solve(line, heads)
@@ -68,7 +63,7 @@ def test_a_law_whose_tangents_never_agree_is_told() -> None:
 
 
 def test_forces_that_grow_without_bounds_end_the_explicit_coupling() -> None:
-    law = LinearInSteps(LinearLaw(1e9, 0.0), 1, pulls=False)
+    law = LawInSteps(1, 1e9, 0.0, pulls=False)
     inner, line, heads = pressed(law, 0.0, 1e-5)
     heads.early_height[:] = 1.1
     with pytest.raises(RunBroken, match=r'beyond all bounds.*take numerics\.coupling = "implicit"'):

@@ -127,5 +127,6 @@ def test_blocks_of_one_station_type_are_kept_once() -> None:
     _, product, factors = parts("stitch")
     assert product is not None and factors is not None
     # The line repeats after seven stations; the wire comes and goes at five places.
-    assert product.n_kinds < N and product.kinds.size == N
-    assert factors.n_kinds <= N and factors.starts[-1] == 4 * N + 2 * (6 + 5 + 3 + 6)
+    assert np.unique(product.arrays.kinds).size < N == product.arrays.kinds.size
+    assert np.unique(factors.arrays.kinds).size <= N
+    assert factors.stations.starts[-1] == 4 * N + 2 * (6 + 5 + 3 + 6)
