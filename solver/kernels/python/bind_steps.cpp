@@ -15,7 +15,7 @@ void write(const Steps& steps, const std::string& path, const py::object& ahead)
     if (!parts.free) throw py::value_error("these steps are taken by an ensemble");
     const TwoPasses& free = *parts.free;
     PreparedLine line{parts, free.parts(), free.tracked(), free.window(), {}, {}};
-    for (const Head* head : parts.heads) line.heads.push_back(parts_of(*head));
+    for (const Head* head : parts.heads) line.heads.push_back(head->parts());
     line.ahead = From<Ahead>::convert(ahead, "ahead", kept);
     write_line(path, line);
 }
