@@ -2,8 +2,9 @@
 // Records with all arrays that they point to, as a file.
 //
 // Arrays that share memory still share it when read: overlapping ones are kept as one block of
-// bytes, and a record's array as a part of a block. Blocks stand in memory where they stood, modulo
-// pages of 4096 bytes, as arrays that are walked through side by side are placed for the caches.
+// bytes, with the address where it stood, and a record's array by its own. Blocks stand in memory
+// where they stood, modulo pages of 4096 bytes, as arrays that are walked through side by side are
+// placed for the caches.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -99,54 +100,35 @@ struct MemoryBlock {
     bool changes;  ///< whether any array in it is written, and read in a later step
 };
 
-/// Finds the blocks of all arrays.
-class BlockFinder {
+/// Writer of a record's members as bytes, with arrays as where they stand in memory.
+class ImageWriter {
   public:
     template <class T>
-    void bytes(T&) {}
-    void count(size_t&) {}
+    void bytes(T& value) {
+        text_.append(reinterpret_cast<const char*>(&value), sizeof(T));
+    }
+    void count(size_t& n) { bytes(n); }
     void scratch(bool is) { is_scratch_ = is; }
     template <class T>
     void array(T*& data, size_t n) {
         if (n == 0) return;
+        bytes(data);
         const auto begin = reinterpret_cast<uintptr_t>(data);
         found_.push_back({begin, begin + n * sizeof(T), !std::is_const_v<T> && !is_scratch_});
     }
-    /// All of them, in the order of memory.
+    const std::string& text() const { return text_; }
+    /// Blocks of all arrays, in the order of memory.
     std::vector<MemoryBlock> blocks();
 
   private:
+    std::string text_;
     std::vector<MemoryBlock> found_;
     bool is_scratch_ = false;
 };
 
-/// Writer of a record's members as bytes, with arrays as parts of blocks.
-class ImageWriter {
-  public:
-    explicit ImageWriter(std::vector<MemoryBlock> blocks) : blocks_(std::move(blocks)) {}
-    template <class T>
-    void bytes(T& value) {
-        const auto* from = reinterpret_cast<const char*>(&value);
-        text_.append(from, sizeof(T));
-    }
-    void count(size_t& n) { bytes(n); }
-    template <class T>
-    void array(T*& data, size_t n) {
-        if (n == 0) return;
-        const auto begin = reinterpret_cast<uintptr_t>(data);
-        auto block = std::ranges::upper_bound(blocks_, begin, {}, &MemoryBlock::begin) - 1;
-        uint64_t place[2] = {static_cast<uint64_t>(block - blocks_.begin()), begin - block->begin};
-        bytes(place);
-    }
-    const std::string& text() const { return text_; }
-
-  private:
-    std::vector<MemoryBlock> blocks_;
-    std::string text_;
-};
-
-/// Blocks that were read, in memory of their own.
+/// A block that was read, in memory of its own, and where it stood when it was written.
 struct OwnBlock {
+    uintptr_t stood;
     std::unique_ptr<std::byte[]> memory;
     std::span<std::byte> bytes;
     bool changes;
@@ -172,13 +154,15 @@ class ImageReader {
     void array(T*& data, size_t n) {
         data = nullptr;
         if (n == 0) return;
-        uint64_t place[2];
-        bytes(place);
-        const uint64_t block = place[0], begin = place[1];
-        if (block >= blocks_.size() || n > blocks_[block].bytes.size() / sizeof(T) ||
-            begin > blocks_[block].bytes.size() - n * sizeof(T))
+        uintptr_t stood;
+        bytes(stood);
+        const auto next = std::ranges::upper_bound(blocks_, stood, {}, &OwnBlock::stood);
+        if (next == blocks_.begin()) throw std::runtime_error("an array in it has no block");
+        const OwnBlock& block = *(next - 1);
+        const size_t begin = stood - block.stood, size = block.bytes.size();
+        if (begin > size || n > (size - begin) / sizeof(T))
             throw std::runtime_error("an array in it is beyond its block");
-        data = reinterpret_cast<T*>(blocks_[block].bytes.data() + begin);
+        data = reinterpret_cast<T*>(block.bytes.data() + begin);
     }
 
   private:
@@ -187,38 +171,31 @@ class ImageReader {
     std::vector<OwnBlock>& blocks_;
 };
 
-/// Write a file with a header of one line, the bytes of `writer` and the blocks. Throws
+/// Write a file with a header of one line, and what was written of a record with its blocks. Throws
 /// std::runtime_error if it cannot be written.
-void write_image(const std::string& path, const std::string& header, const std::string& text,
-                 const std::vector<MemoryBlock>& blocks);
-/// Bytes of such a file, and its checksum.
-struct ImageText {
-    std::string bytes;
-    uint64_t sum;
-};
-/// Read such a file, which begins with this header; returns the bytes and fills in the blocks.
-/// Throws std::runtime_error if it cannot be read, has another header, or was damaged.
-ImageText read_image(const std::string& path, const std::string& header,
-                     std::vector<OwnBlock>& blocks);
+void write_image(const std::string& path, const std::string& header, ImageWriter& writer);
+/// Read such a file, which begins with this header; fills in the bytes of the record and the
+/// blocks, and returns the file's checksum. Throws std::runtime_error if it cannot be read, has
+/// another header, or was damaged.
+uint64_t read_image(const std::string& path, const std::string& header, std::string& text,
+                    std::vector<OwnBlock>& blocks);
 
 /// Write a record.
 template <class T>
 void write_record(const std::string& path, const std::string& header, T& record) {
-    BlockFinder finder;
-    visit(finder, record);
-    const auto blocks = finder.blocks();
-    ImageWriter writer(blocks);
+    ImageWriter writer;
     visit(writer, record);
-    write_image(path, header, writer.text(), blocks);
+    write_image(path, header, writer);
 }
 /// Read it, with the memory of its arrays; returns the checksum of the file.
 template <class T>
 uint64_t read_record(const std::string& path, const std::string& header, T& record,
                      std::vector<OwnBlock>& blocks) {
-    ImageText text = read_image(path, header, blocks);
-    ImageReader reader(std::move(text.bytes), blocks);
+    std::string text;
+    const uint64_t sum = read_image(path, header, text, blocks);
+    ImageReader reader(std::move(text), blocks);
     visit(reader, record);
-    return text.sum;
+    return sum;
 }
 
 }  // namespace catenary
