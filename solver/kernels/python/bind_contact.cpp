@@ -22,24 +22,15 @@ std::tuple<int64_t, bool> find_signed(const System& system, const Signs& signs, 
     return {found.rounds, found.pivoted};
 }
 
-/// A map that Python evaluates.
-class CalledMap : public Map {
-  public:
-    explicit CalledMap(const py::function& of) : of_(of) {}
-    void at(std::span<const double> z, std::span<double> value) override {
-        const py::array_t<double> at(static_cast<py::ssize_t>(z.size()), z.data());
-        const auto found = of_(at).cast<py::array_t<double>>();
-        if (found.size() != at.size()) throw py::value_error("the map has the wrong size");
-        std::ranges::copy(std::span(found.data(), z.size()), value.begin());
-    }
-
-  private:
-    const py::function& of_;
-};
-
+/// The zero of a map that Python evaluates.
 bool find_zero_of(const py::function& of, std::span<double> z, double width, double small,
                   const Room& room) {
-    CalledMap map(of);
+    const Map map = [&of](std::span<const double> at, std::span<double> value) {
+        const auto n = static_cast<py::ssize_t>(at.size());
+        const auto found = of(py::array_t<double>(n, at.data())).cast<py::array_t<double>>();
+        if (found.size() != n) throw py::value_error("the map has the wrong size");
+        std::ranges::copy(std::span(found.data(), at.size()), value.begin());
+    };
     return find_zero(map, z, width, small, room);
 }
 
