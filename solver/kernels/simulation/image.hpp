@@ -34,8 +34,7 @@ class CheckSum {
 
 /// Pass all members of a value to a visitor: `bytes(T&)` for plain values, `array(T*&, n)` for
 /// arrays of n numbers, and `count(size_t&)` for lengths, upon which a reader resizes. Pointers to
-/// objects are left out. `scratch(bool)` of one that has it is called around records that are
-/// `kScratch`.
+/// objects are left out.
 template <class Visitor, class T>
 void visit(Visitor& visitor, T& value);
 
@@ -83,10 +82,7 @@ void visit_value(Visitor& visitor, T& value) {
 }
 template <class Visitor, RecordType T>
 void visit_value(Visitor& visitor, T& value) {
-    constexpr bool is_scratch = requires { T::kScratch; };
-    if constexpr (is_scratch && requires { visitor.scratch(true); }) visitor.scratch(true);
     std::apply([&](auto&... member) { (visit(visitor, member), ...); }, value.members());
-    if constexpr (is_scratch && requires { visitor.scratch(true); }) visitor.scratch(false);
 }
 
 template <class Visitor, class T>
@@ -97,7 +93,7 @@ void visit(Visitor& visitor, T& value) {
 /// A part of memory that arrays share.
 struct MemoryBlock {
     uintptr_t begin, end;
-    bool changes;  ///< whether any array in it is written, and read in a later step
+    bool changes;  ///< whether any array in it is written
 };
 
 /// Writer of a record's members as bytes, with arrays as where they stand in memory.
@@ -108,13 +104,12 @@ class ImageWriter {
         text_.append(reinterpret_cast<const char*>(&value), sizeof(T));
     }
     void count(size_t& n) { bytes(n); }
-    void scratch(bool is) { is_scratch_ = is; }
     template <class T>
     void array(T*& data, size_t n) {
         if (n == 0) return;
         bytes(data);
         const auto begin = reinterpret_cast<uintptr_t>(data);
-        found_.push_back({begin, begin + n * sizeof(T), !std::is_const_v<T> && !is_scratch_});
+        found_.push_back({begin, begin + n * sizeof(T), !std::is_const_v<T>});
     }
     const std::string& text() const { return text_; }
     /// Blocks of all arrays, in the order of memory.
@@ -123,7 +118,6 @@ class ImageWriter {
   private:
     std::string text_;
     std::vector<MemoryBlock> found_;
-    bool is_scratch_ = false;
 };
 
 /// A block that was read, in memory of its own, and where it stood when it was written.

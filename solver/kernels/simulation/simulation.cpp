@@ -61,8 +61,8 @@ void Simulation::make_steps() {
     free_->track(line_.tracked);
     if (line_.window) free_->open(*line_.window);
     parts.free = free_.get();
-    room_ = std::make_unique<Room>(size(parts.problem.unknowns.right));
-    parts.problem.unknowns.room = room_.get();
+    room_ = std::make_unique<Room>(size(parts.switched));
+    parts.problem.room = room_.get();
     parts.heads.clear();
     for (const auto& head : heads_) parts.heads.push_back(head.get());
     inputs_.resize(n);
