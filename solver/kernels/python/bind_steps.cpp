@@ -2,7 +2,6 @@
 #include "python/from_python.hpp"
 #include "simulation/simulation.hpp"
 #include "tangents/tangents.hpp"
-#include "views/extremes.hpp"
 
 namespace catenary::python {
 
@@ -109,9 +108,6 @@ void offer_steps(py::module_& module) {
         .def_property_readonly("head_height", output(&TrainOutputs::head_height))
         .def_property_readonly("wire_height", output(&TrainOutputs::wire_height))
         .def_property_readonly("strip_force", output(&TrainOutputs::strip_force));
-
-    offer(module, "take_extremes", take_extremes, "m k, *, *, *, 2 n");
-    offer(module, "take_points", take_points, "m k, *, m, m");
 }
 
 }  // namespace catenary::python

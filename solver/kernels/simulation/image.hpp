@@ -36,58 +36,35 @@ class CheckSum {
 /// arrays of n numbers, and `count(size_t&)` for lengths, upon which a reader resizes. Pointers to
 /// objects are left out.
 template <class Visitor, class T>
-void visit(Visitor& visitor, T& value);
-
-template <class Visitor, class T>
-void visit_value(Visitor& visitor, std::span<T>& value) {
-    size_t n = value.size();
-    visitor.count(n);
-    T* data = value.data();
-    visitor.array(data, n);
-    value = {data, n};
-}
-template <class Visitor, TableType T>
-void visit_value(Visitor& visitor, T& value) {
-    std::apply([&](auto&... size) { (visitor.bytes(size), ...); }, value.sizes());
-    visitor.array(value.data, value.all().size());
-}
-template <class Visitor, class T>
-void visit_value(Visitor& visitor, std::vector<T>& value) {
-    size_t n = value.size();
-    visitor.count(n);
-    value.resize(n);
-    for (T& one : value) visit(visitor, one);
-}
-template <class Visitor, class T>
-void visit_value(Visitor& visitor, std::optional<T>& value) {
-    size_t n = value.has_value();
-    visitor.count(n);
-    if (n && !value) value.emplace();
-    if (n) visit(visitor, *value);
-}
-template <class Visitor, class A, class B>
-void visit_value(Visitor& visitor, std::pair<A, B>& value) {
-    visit(visitor, value.first);
-    visit(visitor, value.second);
-}
-template <class Visitor, class T>
-void visit_value(Visitor&, T*&) {}
-template <class Visitor, class T>
-void visit_value(Visitor&, std::vector<T*>&) {}
-template <class Visitor, class T>
-    requires(!RecordType<T> && !TableType<T> && !std::is_pointer_v<T>) &&
-            std::is_trivially_copyable_v<T>
-void visit_value(Visitor& visitor, T& value) {
-    visitor.bytes(value);
-}
-template <class Visitor, RecordType T>
-void visit_value(Visitor& visitor, T& value) {
-    std::apply([&](auto&... member) { (visit(visitor, member), ...); }, value.members());
-}
-
-template <class Visitor, class T>
 void visit(Visitor& visitor, T& value) {
-    visit_value(visitor, value);
+    auto visit_all = [&](auto&... own) { (visit(visitor, own), ...); };
+    if constexpr (RecordType<T>) {
+        std::apply(visit_all, value.members());
+    } else if constexpr (TableType<T>) {
+        std::apply([&](auto&... size) { (visitor.bytes(size), ...); }, value.sizes());
+        visitor.array(value.data, value.all().size());
+    } else if constexpr (requires { value.subspan(0); }) {
+        size_t n = value.size();
+        visitor.count(n);
+        auto* data = value.data();
+        visitor.array(data, n);
+        value = {data, n};
+    } else if constexpr (requires { value.resize(0); }) {
+        size_t n = value.size();
+        visitor.count(n);
+        value.resize(n);
+        for (auto& one : value) visit(visitor, one);
+    } else if constexpr (requires { value.has_value(); }) {
+        size_t n = value.has_value();
+        visitor.count(n);
+        if (n && !value) value.emplace();
+        if (n) visit(visitor, *value);
+    } else if constexpr (requires { value.second; }) {
+        visit_all(value.first, value.second);
+    } else if constexpr (!std::is_pointer_v<T>) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        visitor.bytes(value);
+    }
 }
 
 /// A part of memory that arrays share.
