@@ -85,8 +85,8 @@ uint64_t read_image(const std::string& path, const std::string& header, std::str
         into.resize(n);
         get(into.data(), n);
     };
-    get_text(text, header.size());
-    if (text != header)
+    get_text(text, std::min(left, header.size()));
+    if (!header.starts_with(text))
         throw std::runtime_error("it is no prepared line of this version of Catenary");
     uint64_t sizes[2];
     get(sizes, sizeof sizes);
