@@ -79,25 +79,22 @@ double Head::height_under(std::span<const double> contact_force) const {
 }
 
 void Head::aim(std::span<const double> drive) {
+    const auto& [touch, state, out, newmark, roll] = arrays();
     const DriveRow<const double> row{drive, n_strips_};
-    if (arrays().roll >= 0) {
-        const auto place = row.place(), rate = row.rate();
-        for (int64_t j = 0; j < n_strips_; ++j) {
-            arrays().touch(0, j, arrays().roll) = place[j];
-            arrays().touch(1, j, arrays().roll) = rate[j];
-        }
+    const auto place = row.place(), rate = row.rate();
+    for (int64_t j = 0; roll >= 0 && j < n_strips_; ++j) {
+        touch(0, j, roll) = place[j];
+        touch(1, j, roll) = rate[j];
     }
-    if (parts_.bending) bend_at(row.place(), row.rate());
-}
-
-void Head::bend_at(std::span<const double> place, std::span<const double> rate) {
-    const int64_t m = static_cast<int64_t>(shapes_.size());
+    if (!parts_.bending) return;
+    const auto& [tables, first, wires] = *parts_.bending;
+    const auto m = std::ssize(shapes_);
     for (int64_t j = 0; j < n_strips_; ++j) {
-        tables_at(parts_.bending->tables, place[j], shapes_, slopes_);
-        const int64_t at = parts_.bending->first + (j / parts_.bending->wires) * m;
+        tables_at(tables, place[j], shapes_, slopes_);
+        const int64_t at = first + (j / wires) * m;
         for (int64_t k = 0; k < m; ++k) {
-            arrays().touch(0, j, at + k) = shapes_[k];
-            arrays().touch(1, j, at + k) = slopes_[k] * rate[j];
+            touch(0, j, at + k) = shapes_[k];
+            touch(1, j, at + k) = slopes_[k] * rate[j];
         }
     }
 }

@@ -123,7 +123,6 @@ class Head {
     double height_under(std::span<const double> contact_force) const;
     /// Put where wires are on the strips into `touch`.
     void aim(std::span<const double> drive);
-    void bend_at(std::span<const double> place, std::span<const double> rate);
     double measured(std::span<const double> contact_force) const;
     Array2<double> by_force() { return {by_force_.data(), 3 * n_, n_strips_}; }
 
