@@ -17,6 +17,7 @@ from catenary.postproc.record.snapshots.field_kinds import (
     FieldKind,
 )
 from catenary.postproc.record.snapshots.field_layout import Slots
+from catenary.solver.kernels import native
 from catenary.solver.model.axial_elements import rows_in_curve, slope_rows
 
 
@@ -62,16 +63,18 @@ class FieldValues:
         ndarray, as its type in the file, (n,) or (n, components)
         """
         rows = slice(first, first + len(known.dropper_force))
-        starts, count = (
+        shown = [
             kind.values_of(points[rows]).astype(np.int64) for points in (slots.first, slots.count)
-        )
-        row = np.repeat(np.arange(count.size), count)
-        shown = np.arange(row.size) + (starts - np.cumsum(count) + count)[row]
-        result = np.zeros((row.size, kind.components), dtype=kind.number)
+        ]
+        taken = np.empty(int(shown[1].sum()))
+        result = np.empty((taken.size, kind.components), dtype=kind.number)
         for component, (values, columns) in enumerate(self._components(kind, slots.block, known)):
-            if values is not None:
-                own = columns[shown]
-                result[:, component] = np.where(own < 0, 0.0, values[row, own])
+            if values is None:
+                result[:, component] = 0.0
+            else:
+                of_rows = np.ascontiguousarray(values, dtype=float)
+                native.take_points(of_rows, columns.astype(np.int64), *shown, taken)
+                result[:, component] = taken
         return result if kind.components > 1 else result[:, 0]
 
     def _components(
