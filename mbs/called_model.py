@@ -31,7 +31,10 @@ class CalledModel:
 
     def stepped(self) -> native.Head:
         """A head that calls this, and keeps it: no collector sees a cycle of both."""
-        return native.CalledHead(self.head.numbers, self._predict, self._advance)
+        s = len(self._model.strip_offsets)
+        still = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
+        arrays = native.HeadArrays(np.zeros((2, s, 0)), np.zeros(0), self.head.numbers, still, -1)
+        return native.CalledHead(arrays, self._predict, self._advance)
 
     def _predict(self, time: float) -> None:
         self.head.numbers[:] = self._model.predict(time).numbers

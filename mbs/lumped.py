@@ -11,7 +11,7 @@ from scipy import linalg
 from catenary.mbs.air import ON_FRAME, ON_HEAD, AirForces
 from catenary.mbs.head.head_arrays import named
 from catenary.mbs.head.laws import LawsInPlace, in_place
-from catenary.mbs.head.newmark_head import SteppedHead, parts_of
+from catenary.mbs.head.newmark_head import SteppedHead, head_of, parts_of
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import lifted
@@ -75,9 +75,9 @@ class LumpedPantograph(SteppedHead):
         self._tied, self._started_at = data.tied, self._base_height
         if data.laws:
             self._put_laws(self._in_place(data, pressing, nominal_height))
-            self._step_by(self._sprung(self._arrays))
+            self._step_by(self._on_springs(self._arrays))
         else:
-            self._step_by(native.LinearChain(self._arrays, self.linear_step()))
+            self._step_by(head_of(self._arrays, linear=self.linear_step()))
 
     @property
     def is_linear(self) -> bool:
@@ -125,10 +125,6 @@ class LumpedPantograph(SteppedHead):
         `SteppedHead`. A base that rises starts there."""
         self._started_at = head_height
         super().place(head_height, velocity)
-
-    def _sprung(self, arrays: native.HeadArrays) -> native.Head:
-        sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
-        return native.LawfulChain(arrays, sprung, self._law_arrays, self._carrier)
 
     def _put_drive(self, time: float) -> None:
         force, now = self._drive(time), self._now

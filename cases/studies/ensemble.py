@@ -31,11 +31,11 @@ from catenary.postproc.files.filtered_force import PATH as FILTERED
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.marched_results import MarchedFile
 from catenary.postproc.read.results import Results
+from catenary.postproc.record.line_rows import take_extremes
 from catenary.postproc.record.run_watch import RunWatch
 from catenary.postproc.report.summary import short_summary
 from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
 from catenary.solver.ensemble.shared_line import SharedLine, why_alone
-from catenary.solver.kernels import native
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest, SoundLine, line_at_rest, sound_line
@@ -76,8 +76,8 @@ class Keeper(Observer):
         self._times.append(view.times.copy())
         self._rows.append(view.rows[:, self._read])
         for name, kept in self._extremes.items():
-            begin, end, _ = self._moving.columns(name).indices(kept.shape[1])
-            native.take_extremes(view.rows, view.columns[name].start, begin, end, kept)
+            moved = self._moving.columns(name)
+            take_extremes(view.rows[:, view.columns[name]][:, moved], kept[:, moved])
 
     def tables(self) -> dict[str, np.ndarray]:
         """Histories by their paths in a result file, ``time`` among them."""

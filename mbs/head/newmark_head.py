@@ -38,6 +38,11 @@ class SteppedHead(ABC):
     """
 
     stepped: native.Head
+    _masses: np.ndarray
+    _stiffness: np.ndarray
+    _damping: np.ndarray
+    _carrier: int
+    _mechanism: native.ReducedMechanism | None = None
 
     def __init__(self, head: HeadParts, n: int, stepping: Stepping) -> None:
         raise_time, dt, beta, gamma, lateral, self._base = stepping
@@ -152,7 +157,7 @@ class SteppedHead(ABC):
         self._state[:n] = head_height * self._level
         self._state[n : 2 * n] = velocity * self._level
         # A start from any other acceleration than what these forces cause loses an order in dt.
-        still = self._sprung(self._arrays._replace(newmark=_NO_TIME))
+        still = self._on_springs(self._arrays._replace(newmark=_NO_TIME))
         self._put_drive(0.0)
         if not still.step(self.row):
             self._refuse(still, 0.0)
@@ -175,9 +180,11 @@ class SteppedHead(ABC):
     def _refuse(self, left: native.Head, time: float) -> None:  # noqa: B027  (chains are endless)
         """Raise RunBroken for a head that has left its heights in a step to ``time`` [s]."""
 
-    @abstractmethod
-    def _sprung(self, arrays: native.HeadArrays) -> native.Head:
+    def _on_springs(self, arrays: native.HeadArrays) -> native.Head:
         """A compiled head on its springs and laws, by the factors of Newmark's method in arrays."""
+        masses = self._masses, self._stiffness, self._damping, self._push
+        driven = self._carrier, self._law_arrays, self._mechanism
+        return head_of(arrays, sprung=native.SprungMasses(*masses, *driven))
 
     @abstractmethod
     def _put_drive(self, time: float) -> None:
@@ -247,6 +254,15 @@ class SteppedHead(ABC):
             s = self._lateral.place.size
             self.row[N_DRIVE : N_DRIVE + s] = self._lateral.place
             self.row[N_DRIVE + s :] = self._lateral.rate
+
+
+def head_of(
+    arrays: native.HeadArrays,
+    linear: native.LinearStep | None = None,
+    sprung: native.SprungMasses | None = None,
+) -> native.Head:
+    """A compiled head of one of these models."""
+    return native.Head(native.HeadParts(arrays, 0, linear, sprung, None, None, None))
 
 
 def _half_cosine(time: Any, raise_time: float) -> Any:

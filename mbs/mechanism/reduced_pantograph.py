@@ -70,22 +70,17 @@ class RaisingPantograph(SteppedHead):
         super().__init__(head, head.n + 1, stepping)
         self._data = data
         self._air = air
-        self._zero = data.head.offset + data.base_height
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
         self._masses = np.append(head.masses, 0.0)
         self._stiffness, self._damping = head.stiffness, head.damping
-        self._step_by(self._sprung(self._arrays))
-
-    def _sprung(self, arrays: native.HeadArrays) -> native.RaisedHead:
-        data = self._data
-        sprung = native.SprungMasses(self._masses, self._stiffness, self._damping, self._push)
-        mechanism = native.ReducedMechanism(data.frame.tables, data.head.weight, self._zero)
-        return native.RaisedHead(arrays, sprung, self._law_arrays, mechanism)
+        self._carrier = head.n
+        zero = data.head.offset + data.base_height
+        self._mechanism = native.ReducedMechanism(data.frame.tables, data.head.weight, zero)
+        self._step_by(self._on_springs(self._arrays))
 
     def _refuse(self, left: native.Head, time: float) -> None:
         # NaN is none: the coupling refuses it.
-        assert isinstance(left, native.RaisedHead)
         raise self._data.frame.left(left.height, time)
 
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:

@@ -10,9 +10,15 @@ import numpy as np
 from catenary.postproc.channels.line_record import LineRecord
 from catenary.postproc.files.result_file import LineRows
 from catenary.postproc.record.column_gather import ColumnGather
-from catenary.solver.kernels import native
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import Stage
+
+
+def take_extremes(rows: np.ndarray, kept: np.ndarray) -> None:
+    """Take rows (n, m) into ``kept`` (2, m), the smallest and the largest of each column."""
+    smallest, largest = kept
+    np.fmin(smallest, np.fmin.reduce(rows, axis=0, initial=np.inf), out=smallest)
+    np.fmax(largest, np.fmax.reduce(rows, axis=0, initial=-np.inf), out=largest)
 
 
 class _KeptRows:
@@ -152,8 +158,8 @@ class LineGather:
         edges = self._record.within(position[start::every])
         for name, part in self._parts.items():
             moved = slice(None) if all_move else self._moving.columns(name)
-            begin, end, _ = moved.indices(part.owned.size)
-            native.take_extremes(rows, parts[name].start, begin, end, part.extremes)
+            mine = rows[:, parts[name]][:, : part.owned.size]
+            take_extremes(mine[:, moved], part.extremes[:, moved])
             if part.kept is not None and start < n_steps:
                 shown = rows[start::every, parts[name]]
                 own = part.kept.columns_within(edges)

@@ -80,7 +80,7 @@ class InnerProblem:
     gap : Affine of depths [m], their rates [m/s] without forces, and what forces take off them
     found : Depths under the forces looked at last
     pivoted : whether an active set has cycled since this was last set to False
-    unknowns : room for the problem, another one when more links need some
+    room : room for the problem, another one when more links need some
     """
 
     def __init__(self, law: LawInSteps, coupled: native.Coupled) -> None:
@@ -120,8 +120,7 @@ class InnerProblem:
                 "smaller numerics.dt_s"
             )
         depth, rate = self.found
-        solution = self.unknowns.solution
-        forces = solution[:n], solution[n:size]
+        forces = self._solution[:n], self._solution[n:size]
         return InnerSolution(*forces, depth, rate, rounds, self.pivoted, complete)
 
     def slack_under(self, line: LineResponse, force: np.ndarray) -> np.ndarray:
@@ -132,23 +131,15 @@ class InnerProblem:
         NotConverged
             If there are none.
         """
-        n, m = self.law.n, line.count
-        coupled = self.coupled
-        if not m or not native.any_switched(line.rows, m, coupled, force):
-            return np.zeros(m)
+        m = line.count
         if m > self._room:
             self.make_room(m)
-        _, behind, matrix, right, _, room = self.unknowns
-        none, links = np.zeros(n), slice(n, n + m)
-        native.couple(line.rows, m, coupled, none, none, self.unknowns)
-        own = right[links] - matrix[links, :n] @ force
-        system = native.System(own, np.zeros(m), matrix[links, links].copy())
-        signs = native.Signs(np.zeros(m, dtype=bool), behind[links])
-        rounds, pivoted = native.find_solution(system, signs, _MAX_ROUNDS, room)
+        links = line.rows, m, self.coupled
+        rounds, pivoted = native.slack_under(*links, force, _MAX_ROUNDS, self.room)
         self.pivoted |= pivoted
         if rounds <= 0:
             raise NotConverged(_NO_SOLUTION)
-        return system.solution
+        return self._solution[:m].copy()
 
     def take(self, line: LineResponse, heads: Heads) -> None:
         """Take the gap without forces from the answers of both sides for this step.
@@ -180,7 +171,7 @@ class InnerProblem:
         return not native.leaves_out(force, slack, line.rows, line.bounds, self.coupled)
 
     def problem(self, heads: native.Affine, line: LineResponse) -> native.SmallProblem:
-        """Small problem as kernels solve it; ``unknowns`` are others when more links need room."""
+        """Small problem as kernels solve it; ``room`` is another one when more links need it."""
         return native.SmallProblem(
             heads=heads,
             share=line.share,
@@ -188,20 +179,14 @@ class InnerProblem:
             pulls=self.law.pulls,
             tangents=self.law.tangents,
             coupled=self.coupled,
-            unknowns=self.unknowns,
+            room=self.room,
             found=self.found,
             max_rounds=_MAX_ROUNDS,
         )
 
     def make_room(self, n_links: int) -> None:
-        """Make room for at least so many links with a row; ``unknowns`` are then others."""
-        n = self.law.n
+        """Make room for at least so many links with a row; ``room`` is then another one."""
         self._room = max(n_links, 2 * self._room)
-        size = n + self._room
-        always = np.zeros(size, dtype=bool)
-        always[:n] = self.law.pulls
-        behind = np.zeros(size, dtype=np.int64)
-        right, solution = np.zeros((2, size))
-        matrix, room = np.zeros((size, size)), native.Room(size)
-        self.unknowns = native.Unknowns(always, behind, matrix, right, solution, room)
+        self.room = native.Room(self.law.n + self._room)
+        self._solution = self.room.solution
         self._bound_to = None, None

@@ -219,10 +219,10 @@ class CompiledSteps:
         """Native steps on the arrays that the scheme has now."""
         coupling = self.scheme.coupling
         assert isinstance(coupling, Implicit)
-        share, unknowns = self.scheme.share, coupling.inner.unknowns
+        share, room = self.scheme.share, coupling.inner.room
         # A step may exchange these arrays for larger ones.
-        if self._made_of[0] is not share or self._made_of[1] is not unknowns:
-            self._made_of = share, unknowns
+        if self._made_of[0] is not share or self._made_of[1] is not room:
+            self._made_of = share, room
             moved, showing = self._moved, self._showing
             parts = step_parts(
                 self.scheme,
@@ -276,7 +276,7 @@ def step_parts(scheme: OneSolve, heads: Sequence[native.Head], **of_line: Any) -
         problem=problem,
         law=coupling.law.in_loop(),
         lateral_place=pantographs.lateral_place,
-        switched=np.zeros(problem.unknowns.right.size, dtype=np.int64),
+        switched=np.zeros(problem.room.most, dtype=np.int64),
         train_outputs=pantographs,
         outputs=pantographs.outputs,
         **of_line,

@@ -23,12 +23,6 @@ Pair columns_of(const Node& node, std::span<const double> data, double height, d
 }
 
 CATENARY_FOR_TARGETS
-void put_one(double* __restrict answer, int64_t n, Pair one) {
-    for (int64_t j = 0; j < n; ++j)
-        answer[j] = one.height * one.by_height[j] + one.slope * one.by_slope[j];
-}
-
-CATENARY_FOR_TARGETS
 void put_both(double* __restrict answer, int64_t n, Pair one, Pair other) {
     for (int64_t j = 0; j < n; ++j) {
         const double of_one = one.height * one.by_height[j] + one.slope * one.by_slope[j];
@@ -97,12 +91,12 @@ void put_columns(const Node* nodes, std::span<const double> data, const double (
         return;
     }
     // Windows of neighbours are nearly the same: their common part is written once.
-    clear(answer, filled[0], std::min(filled[1], low));
-    clear(answer, std::max(filled[0], end), filled[1]);
+    clear(answer, std::min(filled[0], low), last);
+    clear(answer, high, std::max(filled[1], end));
     double* whole = part(answer, low, end).data();
-    put_one(whole, last - low, one);
+    add_one(whole, last - low, one);
     put_both(whole + (last - low), high - last, one.from(last - low), other);
-    put_one(whole + (high - low), end - high, other.from(high - last));
+    add_one(whole + (high - low), end - high, other.from(high - last));
     filled[0] = low;
     filled[1] = end;
 }

@@ -8,6 +8,23 @@
 
 namespace catenary {
 
+/// matrix x = right of m unknowns, the length of `right`; the matrix may have more of both.
+struct System {
+    Array2<double> matrix;
+    std::span<double> right, solution;
+    CATENARY_RECORD(right, solution, matrix)
+    CATENARY_SHAPES("m, m, m.. m..")
+};
+
+/// Signs of m unknowns: `always` whether one may have any sign; `behind` of a dependent's row how
+/// many rows before it its leader's is, with which it acts, 0 of others.
+struct Signs {
+    std::span<bool> always;
+    std::span<int64_t> behind;
+    CATENARY_RECORD(always, behind)
+    CATENARY_SHAPES("m, m")
+};
+
 /// Room for a path of simplices in up to n dimensions.
 struct PathRoom {
     Array2<double> columns;  ///< (n + 1, n + 1)
@@ -16,7 +33,7 @@ struct PathRoom {
     std::span<bool> all;     ///< (n + 1,)
 };
 
-/// Room to solve for up to k unknowns.
+/// Room for a problem of up to k unknowns, such as contact forces and then compensations.
 class Room {
     std::vector<std::shared_ptr<void>> memory_;
     template <class T>
@@ -34,6 +51,14 @@ class Room {
     explicit Room(int64_t most) : k(most) {}
 
     int64_t k;
+    /// The problem and its solution, see `System` and `Signs`.
+    Array2<double> matrix = table<double>(k, k);
+    std::span<double> right = numbers<double>(k), solution = numbers<double>(k);
+    std::span<bool> always = numbers<bool>(k);
+    std::span<int64_t> behind = numbers<int64_t>(k);
+    /// The system of the first unknowns, and their signs.
+    System system(int64_t n) const { return {matrix, right.first(n), solution.first(n)}; }
+    Signs signs(int64_t n) const { return {always.first(n), behind.first(n)}; }
     /// For elimination, and sets of rows that act.
     Array2<double> factors = table<double>(k, k);
     std::span<int64_t> acting = numbers<int64_t>(k), order = numbers<int64_t>(k);
@@ -49,23 +74,6 @@ class Room {
     Array2<bool> marks = table<bool>(2, k);
     PathRoom path{table<double>(k / 2 + 1, k / 2 + 1), table<double>(7, k / 2 + 1),
                   table<int64_t>(4, k / 2 + 1), numbers<bool>(k / 2 + 1)};
-};
-
-/// matrix x = right of m unknowns, the length of `right`; the matrix may have more of both.
-struct System {
-    Array2<double> matrix;
-    std::span<double> right, solution;
-    CATENARY_RECORD(right, solution, matrix)
-    CATENARY_SHAPES("m, m, m.. m..")
-};
-
-/// Signs of m unknowns: `always` whether one may have any sign; `behind` of a dependent's row how
-/// many rows before it its leader's is, with which it acts, 0 of others.
-struct Signs {
-    std::span<bool> always;
-    std::span<int64_t> behind;
-    CATENARY_RECORD(always, behind)
-    CATENARY_SHAPES("m, m")
 };
 
 /// Solve the rows and columns that act by elimination with pivoting; the others are zero.

@@ -55,7 +55,7 @@ Solved solve(const SmallProblem& problem, const std::optional<MarchedHertzLaw>& 
     const MarchedHertzLaw& law = *marched;
     const auto& [depth, rate] = problem.found;
     const Affine& gap = problem.gap;
-    const auto force = problem.unknowns.solution.first(depth.size());
+    const auto force = problem.room->solution.first(depth.size());
     Solved solved{};
     // Without a force heads stand highest: from there Newton's method comes from one side.
     if (!subtract(problem.heads, problem.share.line, problem.share.present, gap)) return solved;
@@ -68,7 +68,7 @@ Solved solve(const SmallProblem& problem, const std::optional<MarchedHertzLaw>& 
         rounds += solved.rounds;
         pivoted = pivoted || solved.pivoted;
         linearise(law, depth, rate);
-        const auto compensation = part(problem.unknowns.solution, size(depth), solved.size);
+        const auto compensation = part(problem.room->solution, size(depth), solved.size);
         if (agrees(gap, problem.share.rows, force, compensation, law, number)) {
             solved.rounds = rounds;
             solved.pivoted = pivoted;
@@ -81,7 +81,7 @@ Solved solve(const SmallProblem& problem, const std::optional<MarchedHertzLaw>& 
 int64_t find_forces(double time, const SmallProblem& problem, const StepLaw& law,
                     std::span<int64_t> switched, Counts& counts) {
     const Flags& flags = problem.share.flags[0];
-    const auto solution = problem.unknowns.solution;
+    const auto solution = problem.room->solution;
     const int64_t n = size(problem.gap.place);
     if (flags.broken != 0.0 || flags.missing != 0.0) return kLeft;
     const Solved solved = solve(problem, law.marched);

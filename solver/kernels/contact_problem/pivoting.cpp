@@ -152,7 +152,7 @@ Pivoted pivot_from(const System& system, const Signs& signs, const Room& room) {
 /// them; so there are shares that agree with it. They are sought for the leaders that the pivoting
 /// cycled through; others keep all or nothing, as the set has it, unless their tension then
 /// disagrees.
-class Shares : public Map {
+class Shares {
   public:
     Shares(const System& system, const Signs& signs, const Room& room, const Pivoted& circle)
         : system_(system),
@@ -186,7 +186,7 @@ class Shares : public Map {
             n = 0;
             for (int64_t leader : leaders())
                 if (is_sought_[leader]) place_[n++] -= excess_[leader];
-            const bool found = find_zero(*this, place, kFirstGrid, kAgreement, room_);
+            const bool found = find_zero(std::ref(*this), place, kFirstGrid, kAgreement, room_);
             take(place);
             put_excess();
             bool more = false;
@@ -204,7 +204,7 @@ class Shares : public Map {
 
     /// Zero where shares, a place cut to 0 to 1, agree with tensions, as far as it lies outside:
     /// the normal map of a variational inequality.
-    void at(std::span<const double> place, std::span<double> value) override {
+    void operator()(std::span<const double> place, std::span<double> value) {
         take(place);
         put_excess();
         int64_t n = 0;

@@ -22,6 +22,7 @@ namespace catenary {
 struct Found {
     int64_t rounds;  ///< that were needed; not positive if there is no solution
     bool pivoted;    ///< whether the active set cycled
+    CATENARY_RECORD(rounds, pivoted)
 };
 
 /// Solve for signs by the active set, and where that does not settle within some rounds by Murty's

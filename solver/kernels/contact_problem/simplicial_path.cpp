@@ -31,7 +31,7 @@ bool all_finite(std::span<const double> numbers) {
 /// The path on one grid.
 class Path {
   public:
-    Path(Map& of, std::span<const double> start, double width, const Room& room)
+    Path(const Map& of, std::span<const double> start, double width, const Room& room)
         : of_(of),
           start_(start),
           width_(width),
@@ -108,7 +108,7 @@ class Path {
         go_to(number);
         for (int64_t i = 0; i < n_; ++i) place_[i] = at(i);
         if (corner_[n_] != 0)
-            of_.at(place_, entering_.first(n_));
+            of_(place_, entering_.first(n_));
         else
             for (int64_t i = 0; i < n_; ++i) entering_[i] = place_[i] - start_[i];
         for (int64_t i = 0; i < n_; ++i) entering_[i] /= width_;
@@ -162,7 +162,7 @@ class Path {
         return gone;
     }
 
-    Map& of_;
+    const Map& of_;
     std::span<const double> start_;
     double width_;
     int64_t n_;
@@ -175,10 +175,10 @@ class Path {
 
 }  // namespace
 
-bool find_zero(Map& of, std::span<double> z, double width, double small, const Room& room) {
+bool find_zero(const Map& of, std::span<double> z, double width, double small, const Room& room) {
     const auto value = room.path.numbers[6].first(z.size());
     auto is_zero = [&] {
-        of.at(z, value);
+        of(z, value);
         return std::ranges::all_of(value, [&](double each) { return std::abs(each) <= small; });
     };
     for (; width > kFinest; width *= kFiner) {

@@ -11,17 +11,14 @@
 // level 0. It cannot come back there, so it arrives at level 1 where the map points away from a
 // point on a large sphere around it. Finer grids from there on, each with a path of its own, leave
 // a zero as exact as wanted.
+#include <functional>
+
 #include "contact_problem/active_set.hpp"
 
 namespace catenary {
 
-/// A continuous map of R^n to itself.
-class Map {
-  public:
-    virtual ~Map() = default;
-    /// Fill in the value at z; none of it need be a number.
-    virtual void at(std::span<const double> z, std::span<double> value) = 0;
-};
+/// A continuous map of R^n to itself: fills in the value at z; none of it need be a number.
+using Map = std::function<void(std::span<const double> z, std::span<double> value)>;
 
 /// Find a zero of a map that is known to less than `small`, and for which (z - start) . of(z) > 0
 /// for all z that are far from the start.
@@ -30,6 +27,6 @@ class Map {
 /// `width` is that of the first grid, in units of z; a largest component of `small` counts as zero.
 /// Returns whether the place is a zero: not if the path is too long, or the map no number on it.
 /// `room` is for 2 n unknowns at least.
-bool find_zero(Map& of, std::span<double> z, double width, double small, const Room& room);
+bool find_zero(const Map& of, std::span<double> z, double width, double small, const Room& room);
 
 }  // namespace catenary

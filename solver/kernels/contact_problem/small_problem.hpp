@@ -23,22 +23,6 @@ struct Coupled {
     CATENARY_SHAPES("n *, n, n, n, n")
 };
 
-/// Room for a problem with up to k unknowns: contact forces, then compensations.
-struct Unknowns {
-    static constexpr bool kScratch = true;  ///< no step reads numbers of the one before
-    std::span<bool> always;                 ///< see `Signs`
-    std::span<int64_t> behind;
-    Array2<double> matrix;  ///< (k, k)
-    std::span<double> right, solution;
-    Room* room;
-
-    /// The system of the first ones, and their signs.
-    System system(int64_t n) const { return {matrix, right.first(n), solution.first(n)}; }
-    Signs signs(int64_t n) const { return {always.first(n), behind.first(n)}; }
-    CATENARY_RECORD(always, behind, matrix, right, solution, room)
-    CATENARY_SHAPES("k, k, k k, k, k")
-};
-
 /// Depths [m] and rates [m/s] of the gap at n contacts under forces.
 struct Depths {
     std::span<double> depth, rate;
@@ -53,11 +37,11 @@ struct SmallProblem {
     bool pulls;         ///< whether forces of contacts on strips may have any sign
     Tangents tangents;  ///< of the contact law
     Coupled coupled;
-    Unknowns unknowns;   ///< in which the solution is left
+    Room* room;          ///< in which the solution is left
     Depths found;        ///< under the solution
     int64_t max_rounds;  ///< of the active-set iteration
-    CATENARY_RECORD(heads, share, gap, pulls, tangents, coupled, unknowns, found, max_rounds)
-    CATENARY_SHAPES("n=n, n=n, n=n, *, n=n, *, k=k, n=n")
+    CATENARY_RECORD(heads, share, gap, pulls, tangents, coupled, room, found, max_rounds)
+    CATENARY_SHAPES("n=n, n=n, n=n, *, n=n, *, *, n=n")
 };
 
 struct Solved {
@@ -67,6 +51,7 @@ struct Solved {
     bool finite;     ///< whether depths and rates are
     bool complete;   ///< whether all links that have switched had a row, see `leaves_out`
     bool pivoted;    ///< whether an active set cycled
+    CATENARY_RECORD(rounds, size, finite, complete, pivoted)
 };
 
 /// Find contact forces and compensations for a law's tangents.
@@ -76,15 +61,14 @@ Solved solve(const SmallProblem& problem);
 bool subtract(const Affine& heads, const Affine& line, std::span<const double> present,
               const Affine& gap);
 /// Put right-hand side and matrix of the contact forces when no link has switched.
-void press(const Affine& gap, const Tangents& tangents, const Unknowns& unknowns);
-/// Whether contact forces (n,) alone take any of the first `count` links beyond its reserve.
-bool any_switched(const LinkRows& rows, int64_t count, const Coupled& coupled,
-                  std::span<const double> force);
+void press(const Affine& gap, const Tangents& tangents, const Room& room);
 /// Put the rows and columns of the first `count` links behind the ones of the n contacts, and how
 /// many rows each is behind its leader. `by_depth` and `by_rate` (n,) are as in `Tangents`.
 void couple(const LinkRows& rows, int64_t count, const Coupled& coupled,
-            std::span<const double> by_depth, std::span<const double> by_rate,
-            const Unknowns& unknowns);
+            std::span<const double> by_depth, std::span<const double> by_rate, const Room& room);
+/// Solve for the compensations of the first `count` links alone under contact forces (n,) [N].
+Found slack_under(const LinkRows& rows, int64_t count, const Coupled& coupled,
+                  std::span<const double> force, int64_t max_rounds, const Room& room);
 /// Fill in depths and rates under forces (n,) and compensations (m,) [N]; whether all are finite.
 bool under(const Affine& gap, const LinkRows& rows, std::span<const double> force,
            std::span<const double> compensation, const Depths& found);

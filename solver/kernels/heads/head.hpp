@@ -1,33 +1,12 @@
 #pragma once
-// Base of all pantographs stepped by Newmark's method: the row that drives a step, state, strips,
-// contact; and the lowering under way until the head is caught, see mbs/lowering.py.
-//
-// A pantograph has n coordinates and s strips. Its state are positions, velocities and
-// accelerations one after the other (3 n,).
-#include <optional>
+// Pantographs stepped by Newmark's method: the row that drives a step, state, strips, contact; and
+// the lowering under way until the head is caught, see mbs/lowering.py.
 #include <vector>
 
-#include "base/arrays.hpp"
-#include "base/curves.hpp"
 #include "contact/touch.hpp"
-#include "heads/regulation.hpp"
+#include "heads/laws.hpp"
 
 namespace catenary {
-
-/// Memory of a lowering. Heights are of the strips' mean over the housing, which catches the head.
-struct LoweringMemory {
-    double height;     ///< now [m]
-    double caught_at;  ///< where it is caught [m], known from the lowering on
-    double phase;      ///< 0 before the lowering, 1 during it, 2 when the head is caught
-};
-
-struct Lowering {
-    double time;                       ///< after which it begins [s]
-    double drop;                       ///< of the head until it is caught [m]
-    std::span<LoweringMemory> memory;  ///< (1,)
-    CATENARY_RECORD(time, drop, memory)
-    CATENARY_SHAPES("*, *, 1")
-};
 
 /// Inputs of a head's step besides its state: the first numbers of a row that is known before the
 /// step. Upward is positive; a model reads the ones that it needs.
@@ -60,68 +39,37 @@ struct DriveRow {
     }
 };
 
-/// Factors of Newmark's formulas, the same for all coordinates.
-struct NewmarkFactors {
-    double dt;                                  ///< step [s]
-    double predict_position, predict_velocity;  ///< dt^2 (1/2 - beta) [s2], dt (1 - gamma) [s]
-    double position, velocity;                  ///< beta dt^2 [s2], gamma dt [s]
-    CATENARY_RECORD(dt, predict_position, predict_velocity, position, velocity)
-};
-
-/// Arrays of a head.
-struct HeadArrays {
-    Array3<double> touch;     ///< (2, s, n) by how much each coordinate raises each strip, and how
-                              ///< fast that changes
-    std::span<double> state;  ///< (3 n,) at the end of the latest step
-    std::span<double> out;    ///< (2 s + 2 s^2,) heights and velocities of the strips without
-                              ///< contact, and both matrices of compliance, row by row
-    NewmarkFactors newmark;
-    int64_t roll;  ///< coordinate of the head's roll, -1 without it
-    CATENARY_RECORD(touch, state, out, newmark, roll)
-    CATENARY_SHAPES("2 s n, 3n")
-};
-
-/// Strips that bend, see mbs/head/strips.py.
-struct Bending {
-    SplineTables tables;  ///< of m modes over the place on a strip [m]
-    int64_t first;        ///< coordinate of the first strip's first mode, the others behind it
-    int64_t wires;        ///< that may touch each strip
-    CATENARY_RECORD(tables, first, wires)
-};
-
 /// A head's strips on n coordinates, which a step advances together.
 class Head {
   public:
     /// Throws std::invalid_argument if shapes do not agree.
-    explicit Head(const HeadArrays& arrays);
+    explicit Head(const HeadParts& parts);
     virtual ~Head() = default;
     Head(const Head&) = delete;
     Head& operator=(const Head&) = delete;
 
     int64_t n() const { return n_; }
     int64_t n_strips() const { return n_strips_; }
-    /// Number of its first contact among the train's contacts.
-    int64_t first() const { return first_; }
-    void set_first(int64_t contact) { first_ = contact; }
+    const HeadParts& parts() const { return parts_; }
+    const HeadArrays& arrays() const { return parts_.arrays; }
+    int64_t first() const { return parts_.first; }
+    void set_first(int64_t contact) { parts_.first = contact; }
 
     /// Add bending of the strips.
     void bend(const Bending& bending);
     /// Add a regulation of the lift.
-    void regulate(const Regulation& regulation) { regulation_ = regulation; }
+    void regulate(const Regulation& regulation) { parts_.regulation = regulation; }
     /// Add a lowering, at whose end the head is caught.
-    void lower(const Lowering& lowering) { lowering_ = lowering; }
+    void lower(const Lowering& lowering) { parts_.lowering = lowering; }
     /// Force that the regulation now adds to the static force [N].
     double added_force() const {
-        return added_force_ + (regulation_ ? regulation_->memory.front().acting : 0.0);
+        return added_force_ + (parts_.regulation ? parts_.regulation->memory.front().acting : 0.0);
     }
     /// Put the added force [N] of a controller that no kernel knows.
     void set_added_force(double force) { added_force_ = force; }
 
-    /// Lowering, bending strips and regulation of the lift, each if there is one.
-    const std::optional<Lowering>& lowering() const { return lowering_; }
-    const std::optional<Bending>& bending() const { return bending_; }
-    const std::optional<Regulation>& regulation() const { return regulation_; }
-    const HeadArrays& arrays() const { return arrays_; }
+    /// Height at which a mechanism's tables were taken in the latest step [m].
+    double height() const { return height_; }
 
     /// Step without contact, with a row of a `Drive`: fills `out`. Whether the head is where its
     /// model reaches.
@@ -140,13 +88,22 @@ class Head {
     /// Decrease of the state by a unit of each contact force, (3 n, s), in the latest step.
     Array2<const double> answers() const { return {by_force_.data(), 3 * n_, n_strips_}; }
     /// `advance` with forces at all contacts of the train.
-    void move(std::span<const double> force) { advance(part(force, first_, first_ + n_strips_)); }
+    void move(std::span<const double> force) { advance(part(force, first(), first() + n_strips_)); }
 
   protected:
-    /// Fill `free()` and call `respond`.
-    virtual bool step_free(const Drive& drive) = 0;
-    /// Remember the latest contact forces.
-    virtual void remember(std::span<const double>) {}
+    /// A head whose steps another class takes.
+    explicit Head(const HeadArrays& arrays);
+    /// Step from the state to that without contact and fill `out`; whether the head is where its
+    /// model reaches. NaN passes, for the coupling to find.
+    virtual bool step_free(const Drive& drive);
+    /// Remember the latest contact forces, which laws read.
+    virtual void remember(std::span<const double> contact_force);
+
+  private:
+    void step_linear(const Drive& drive);
+    bool step_sprung(const Drive& drive);
+    /// Add a mechanism to the step's force and matrix; whether its height is within the tables.
+    bool raise(const Drive& drive, const ReducedMechanism& mechanism);
     /// Fill in `out` and the answers to contact forces, with the `inverse` (n, n) of the matrix of
     /// accelerations.
     void respond(Array2<const double> inverse);
@@ -155,40 +112,29 @@ class Head {
         const double force = added_force();
         return force != 0.0 && drive.part > 0.0 ? drive.part * force : 0.0;
     }
-
-    const NewmarkFactors& newmark() const { return arrays_.newmark; }
-    Array2<const double> touch() const { return arrays_.touch[0]; }
-    std::span<const double> position() const { return state_part(arrays_.state, 0); }
-    std::span<const double> velocity() const { return state_part(arrays_.state, 1); }
-    std::span<const double> acceleration() const { return state_part(arrays_.state, 2); }
-    std::span<const double> state() const { return arrays_.state; }
-    /// The state (3 n,) of the coming step without contact.
-    std::span<double> free() { return free_; }
-
-  private:
-    template <class Number>
-    std::span<Number> state_part(std::span<Number> state, int64_t number) const {
-        return part(state, number * n_, (number + 1) * n_);
+    /// Positions, velocities and accelerations of the state: its parts 0, 1, 2.
+    std::span<const double> state(int64_t number) const {
+        return part<const double>(arrays().state, number * n_, (number + 1) * n_);
     }
+    const NewmarkFactors& newmark() const { return arrays().newmark; }
     /// Whether the head is caught and moves with its housing; fills `out` if so.
     bool is_held(const Drive& drive);
     /// Height of the strips' mean over the housing under contact forces (s,) [N], [m].
     double height_under(std::span<const double> contact_force) const;
     /// Put where wires are on the strips into `touch`.
     void aim(std::span<const double> drive);
-    void bend_at(std::span<const double> place, std::span<const double> rate);
     double measured(std::span<const double> contact_force) const;
     Array2<double> by_force() { return {by_force_.data(), 3 * n_, n_strips_}; }
 
-    HeadArrays arrays_;
-    int64_t n_, n_strips_, first_ = 0;
-    double added_force_ = 0.0;
-    std::vector<double> free_;
+    HeadParts parts_;
+    int64_t n_, n_strips_;
+    double added_force_ = 0.0, height_ = 0.0;
+    std::vector<double> free_;      ///< (3 n,) the state of the coming step without contact
     std::vector<double> by_force_;  ///< (3 n, s) its decrease by a unit of each contact force
-    std::optional<Bending> bending_;
     std::vector<double> shapes_, slopes_;  ///< room for modes
-    std::optional<Regulation> regulation_;
-    std::optional<Lowering> lowering_;
+    /// Of sprung masses: predicted motion (paper eq. 2.5), force and matrix of the step.
+    std::vector<double> position_, velocity_, force_, matrix_;
+    std::optional<SettlingLaws> laws_;
     double roof_ = 0.0;  ///< height of the housing at the end of the step, as in `Drive` [m]
 };
 

@@ -27,8 +27,6 @@ SettlingLaws::SettlingLaws(const HeadLaws& laws, int64_t n)
       plain_matrix_(n * n),
       acceleration_(n),
       segment_(laws.law.size()) {
-    if (laws.ways.rows != size(laws.law) || laws.ways.columns != n)
-        throw std::invalid_argument("laws have other coordinates than their head");
     for (const HeadLaw& law : laws.law)
         if (law.begin < 0 || law.end < law.begin + 2 || law.end > size(laws.points))
             throw std::invalid_argument("a law has two points at least");
@@ -97,10 +95,6 @@ void SettlingLaws::settle(const StepStart& start, const NewmarkFactors& newmark,
             acceleration_[i] = value;
         }
     }
-}
-
-void SettlingLaws::press(std::span<const double> contact_force) {
-    std::ranges::copy(contact_force, laws_.pressed.begin());
 }
 
 }  // namespace catenary

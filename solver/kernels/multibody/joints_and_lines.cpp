@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace catenary {
 
@@ -70,24 +71,21 @@ std::vector<int64_t> independent_rows(Array2<const double> matrix, double depend
     std::vector<double> numbers(most * width), left(width);
     const Array2<double> basis{numbers.data(), most, width};
     const std::span<double> rest(left);
-    const auto length_of = [](std::span<const double> row) {
-        double square = 0.0;
-        for (const double number : row) square += number * number;
-        return std::sqrt(square);
+    const auto product = [](std::span<const double> row, std::span<const double> other) {
+        return std::inner_product(row.begin(), row.end(), other.begin(), 0.0);
     };
     std::vector<int64_t> kept;
     for (int64_t r = 0; r < matrix.rows; ++r) {
         std::ranges::copy(matrix[r], rest.begin());
-        const double whole = length_of(rest);
+        const double whole = std::sqrt(product(rest, rest));
         for (int time = 0; time < 2; ++time)
             for (int64_t b = 0; b < static_cast<int64_t>(kept.size()); ++b) {
                 const auto one = basis[b];
-                double share = 0.0;
-                for (int64_t k = 0; k < width; ++k) share += one[k] * rest[k];
+                const double share = product(one, rest);
                 if (share == 0.0) continue;
                 for (int64_t k = 0; k < width; ++k) rest[k] -= share * one[k];
             }
-        const double length = length_of(rest);
+        const double length = std::sqrt(product(rest, rest));
         if (!(length > dependent * whole)) continue;
         // Rows beyond the number of columns are combinations, whatever the round-off.
         if (static_cast<int64_t>(kept.size()) == most) break;

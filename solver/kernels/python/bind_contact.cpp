@@ -10,36 +10,15 @@ namespace catenary::python {
 
 namespace {
 
-std::tuple<int64_t, int64_t, bool, bool, bool> solve_problem(
-    const SmallProblem& problem, const std::optional<MarchedHertzLaw>& law) {
-    const Solved solved = solve(problem, law);
-    return {solved.rounds, solved.size, solved.finite, solved.complete, solved.pivoted};
-}
-
-std::tuple<int64_t, bool> find_signed(const System& system, const Signs& signs, int64_t max_rounds,
-                                      const Room& room) {
-    const Found found = find_solution(system, signs, max_rounds, room);
-    return {found.rounds, found.pivoted};
-}
-
-/// A map that Python evaluates.
-class CalledMap : public Map {
-  public:
-    explicit CalledMap(const py::function& of) : of_(of) {}
-    void at(std::span<const double> z, std::span<double> value) override {
-        const py::array_t<double> at(static_cast<py::ssize_t>(z.size()), z.data());
-        const auto found = of_(at).cast<py::array_t<double>>();
-        if (found.size() != at.size()) throw py::value_error("the map has the wrong size");
-        std::ranges::copy(std::span(found.data(), z.size()), value.begin());
-    }
-
-  private:
-    const py::function& of_;
-};
-
+/// The zero of a map that Python evaluates.
 bool find_zero_of(const py::function& of, std::span<double> z, double width, double small,
                   const Room& room) {
-    CalledMap map(of);
+    const Map map = [&of](std::span<const double> at, std::span<double> value) {
+        const auto n = static_cast<py::ssize_t>(at.size());
+        const auto found = of(py::array_t<double>(n, at.data())).cast<py::array_t<double>>();
+        if (found.size() != n) throw py::value_error("the map has the wrong size");
+        std::ranges::copy(std::span(found.data(), at.size()), value.begin());
+    };
     return find_zero(map, z, width, small, room);
 }
 
@@ -48,10 +27,15 @@ bool find_zero_of(const py::function& of, std::span<double> z, double width, dou
 void offer_contact(py::module_& module) {
     offer_records<Wires, Answers, Gains, Followed, ContactWork, Sideways, Across, Contacts, Leads,
                   TrainPlaces, StripEnds, Affine, Bounds, LinkRows, Share>(module);
-    offer_records<Tangents, ReportedForces, StepLaw, Coupled, System, Signs, Unknowns, Depths,
-                  SmallProblem>(module);
+    offer_records<Tangents, ReportedForces, StepLaw, Coupled, System, Signs, Depths, SmallProblem>(
+        module);
     py::class_<Room>(module, "Room", "Room to solve for so many unknowns.")
-        .def(py::init<int64_t>(), py::arg("most"));
+        .def(py::init<int64_t>(), py::arg("most"))
+        .def_readonly("most", &Room::k)
+        .def_property_readonly("solution", [](const py::object& own) {
+            const auto solution = own.cast<const Room&>().solution;
+            return py::array_t<double>(std::ssize(solution), solution.data(), own);
+        });
     CATENARY_OFFER_TYPE(module, "NODE", Node, x, y, rest, at, begin, width, local, owned, joined);
     CATENARY_OFFER_TYPE(module, "SAMPLE", Sample, x, height, slope);
     CATENARY_OFFER_TYPE(module, "TOUCH", Touch, first, end, half_length, present, x, element, local,
@@ -73,12 +57,12 @@ void offer_contact(py::module_& module) {
 
     module.attr("NOWHERE") = kNowhere;
     offer(module, "subtract", subtract, "n=n, n=n, n, n=n");
-    offer(module, "any_switched", any_switched, "w=3n+2, *, *, n");
-    offer(module, "couple", couple, "w=3n+2, *, *, n, n, *");
+    offer(module, "slack_under", slack_under, "w=3n+2, *, *, n");
     offer(module, "under", under, "n=n, w=3n+2 m=m.., n, m, n=n");
     offer(module, "leaves_out", leaves_out, "n, m, w=3n+2, n=n, *");
-    offer(module, "solve", solve_problem, "n=n, n=n");
-    offer(module, "find_solution", find_signed, "m=m, m=m");
+    offer<Solved, const SmallProblem&, const std::optional<MarchedHertzLaw>&>(module, "solve",
+                                                                              solve, "n=n, n=n");
+    offer(module, "find_solution", find_solution, "m=m, m=m");
     offer(module, "find_zero", find_zero_of, "");
     module.attr("MOST_TANGENTS") = kMostTangents;
     offer(module, "linearise", linearise, "n=n, n, n");

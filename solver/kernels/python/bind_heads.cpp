@@ -1,5 +1,5 @@
 // Python bindings of pantographs: heads, and multibody systems.
-#include "heads/raised_head.hpp"
+#include "heads/head.hpp"
 #include "multibody/joints_and_lines.hpp"
 #include "python/from_python.hpp"
 
@@ -42,7 +42,7 @@ void extrapolate(Head& head, const py::object& drive, const py::object& early) {
 
 void offer_heads(py::module_& module) {
     offer_records<SplineTables, NewmarkFactors, HeadArrays, Bending, Lowering, Regulation, HeadLaws,
-                  LinearStep, SprungMasses, ReducedMechanism>(module);
+                  LinearStep, SprungMasses, ReducedMechanism, HeadParts>(module);
     CATENARY_OFFER_TYPE(module, "DRIVE", Drive, time, force, part, base, base_velocity,
                         base_acceleration, roof, roof_velocity, head_air, arm_air, bodies_air);
     CATENARY_OFFER_TYPE(module, "HEAD_LAW", HeadLaw, by_base, by_roof, zero, of_rate, begin, end);
@@ -55,6 +55,8 @@ void offer_heads(py::module_& module) {
                         integral, error, samples, acting);
     CATENARY_OFFER_TYPE(module, "LOWERING_MEMORY", LoweringMemory, height, caught_at, phase);
     py::class_<Head>(module, "Head")
+        .def(made_of<Head, HeadParts>("parts"))
+        .def_property_readonly("height", &Head::height)
         .def_property("first", &Head::first, &Head::set_first)
         .def_property("added_force", &Head::added_force, &Head::set_added_force)
         .def("bend", taking(&Head::bend, "bending"))
@@ -68,28 +70,9 @@ void offer_heads(py::module_& module) {
                      numbers<const double>(contact_force, "contact_force", head.n_strips()));
              })
         .def("extrapolate", &extrapolate);
-    py::class_<LinearChain, Head>(module, "LinearChain")
-        .def(made_of<LinearChain, HeadArrays, LinearStep>("arrays", "linear"));
-    py::class_<LawfulChain, Head>(module, "LawfulChain")
-        .def(made_of<LawfulChain, HeadArrays, SprungMasses, HeadLaws, int64_t>("arrays", "masses",
-                                                                               "laws", "carrier"));
-    py::class_<RaisedHead, Head>(module, "RaisedHead")
-        .def(made_of<RaisedHead, HeadArrays, SprungMasses, HeadLaws, ReducedMechanism>(
-            "arrays", "masses", "laws", "mechanism"))
-        .def_property_readonly("height", &RaisedHead::height);
     py::class_<CalledHead, Head>(module, "CalledHead")
-        .def(py::init(
-            [](const py::object& out, const py::object& predict, const py::object& advance) {
-                Kept kept;
-                HeadArrays arrays{};
-                arrays.out = From<std::span<double>>::convert(out, "out", kept);
-                arrays.roll = -1;
-                for (arrays.touch.n = 2;
-                     2 * arrays.touch.rows * (1 + arrays.touch.rows) < size(arrays.out);)
-                    ++arrays.touch.rows;
-                return std::unique_ptr<CalledHead>(
-                    std::make_unique<Held<CalledHead>>(std::move(kept), arrays, predict, advance));
-            }));
+        .def(made_of<CalledHead, HeadArrays, py::object, py::object>("arrays", "predict",
+                                                                     "advance"));
 
     CATENARY_OFFER_TYPE(module, "BODY_PRODUCT", BodyProduct, body, start, end, between, normal,
                         at_start, at_end);

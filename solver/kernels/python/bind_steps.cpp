@@ -1,8 +1,9 @@
 // Python bindings of steps and their rows, and of lines prepared for steps from outside.
+#include <algorithm>
+
 #include "python/from_python.hpp"
 #include "simulation/simulation.hpp"
 #include "tangents/tangents.hpp"
-#include "views/extremes.hpp"
 
 namespace catenary::python {
 
@@ -15,9 +16,24 @@ void write(const Steps& steps, const std::string& path, const py::object& ahead)
     if (!parts.free) throw py::value_error("these steps are taken by an ensemble");
     const TwoPasses& free = *parts.free;
     PreparedLine line{parts, free.parts(), free.tracked(), free.window(), {}, {}};
-    for (const Head* head : parts.heads) line.heads.push_back(parts_of(*head));
+    for (const Head* head : parts.heads) line.heads.push_back(head->parts());
     line.ahead = From<Ahead>::convert(ahead, "ahead", kept);
     write_line(path, line);
+}
+
+/// Fill in points of rows (m, k), one row after another: of row i count[i] points from first[i]
+/// on. A point takes the number at its one of `columns`, or zero where that is below zero.
+void take_points(Array2<const double> rows, std::span<const int64_t> columns,
+                 std::span<const int64_t> first, std::span<const int64_t> count,
+                 std::span<double> result) {
+    int64_t at = 0;
+    for (int64_t i = 0; i < size(first); ++i) {
+        const auto row = rows[i];
+        const auto of = part(columns, first[i], first[i] + count[i]);
+        std::ranges::transform(of, part(result, at, at + count[i]).begin(),
+                               [row](int64_t column) { return column >= 0 ? row[column] : 0.0; });
+        at += count[i];
+    }
 }
 
 /// A simulation, with arrays that are views of its numbers.
@@ -109,8 +125,6 @@ void offer_steps(py::module_& module) {
         .def_property_readonly("head_height", output(&TrainOutputs::head_height))
         .def_property_readonly("wire_height", output(&TrainOutputs::wire_height))
         .def_property_readonly("strip_force", output(&TrainOutputs::strip_force));
-
-    offer(module, "take_extremes", take_extremes, "m k, *, *, *, 2 n");
     offer(module, "take_points", take_points, "m k, *, m, m");
 }
 

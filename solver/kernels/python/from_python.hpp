@@ -278,6 +278,9 @@ class BoundFunction : public Bound {
             return py::none();
         } else if constexpr (std::is_base_of_v<py::object, R>) {
             return std::apply(run, values_);
+        } else if constexpr (RecordType<R>) {
+            R found = std::apply(run, values_);
+            return py::cast(found.members());
         } else {
             return py::cast(std::apply(run, values_));
         }

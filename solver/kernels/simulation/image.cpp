@@ -10,62 +10,9 @@ namespace {
 
 constexpr size_t kPage = 4096;
 
-class FileOutput {
-  public:
-    explicit FileOutput(const std::string& path) : file_(path, std::ios::binary) {
-        if (!file_) throw std::runtime_error("it cannot be written");
-    }
-    void put(const void* data, size_t n) {
-        check_.take(data, n);
-        file_.write(static_cast<const char*>(data), static_cast<std::streamsize>(n));
-        if (!file_) throw std::runtime_error("it cannot be written to its end");
-    }
-    void end() {
-        const uint64_t sum = check_.sum();
-        put(&sum, sizeof sum);
-        if (!file_.flush()) throw std::runtime_error("it cannot be written to its end");
-    }
-
-  private:
-    std::ofstream file_;
-    CheckSum check_;
-};
-
-class FileInput {
-  public:
-    explicit FileInput(const std::string& path) {
-        std::error_code unknown;
-        if (!std::filesystem::is_regular_file(path, unknown))
-            throw std::runtime_error("there is no such file");
-        file_.open(path, std::ios::binary);
-        if (!file_) throw std::runtime_error("it cannot be read");
-        left_ = std::filesystem::file_size(path);
-    }
-    void get(void* data, size_t n) {
-        if (n > left_ || !file_.read(static_cast<char*>(data), static_cast<std::streamsize>(n)))
-            throw std::runtime_error("it ends too early");
-        left_ -= n;
-        check_.take(data, n);
-    }
-    size_t left() const { return left_; }
-    /// Returns the sum of what was read.
-    uint64_t end() {
-        const uint64_t expected = check_.sum();
-        uint64_t sum;
-        get(&sum, sizeof sum);
-        if (sum != expected) throw std::runtime_error("it is damaged");
-        return sum;
-    }
-
-  private:
-    std::ifstream file_;
-    CheckSum check_;
-    size_t left_ = 0;
-};
-
 /// A block as it stands in a file, before its bytes.
 struct BlockHeader {
-    uint64_t size, place_in_page, changes;
+    uint64_t stood, size, changes;
 };
 
 }  // namespace
@@ -80,7 +27,7 @@ void CheckSum::take(const void* data, size_t n) {
     for (; n > 0; --n) put(*bytes++);
 }
 
-std::vector<MemoryBlock> BlockFinder::blocks() {
+std::vector<MemoryBlock> ImageWriter::blocks() {
     std::ranges::sort(found_, {}, &MemoryBlock::begin);
     std::vector<MemoryBlock> merged;
     for (const MemoryBlock& one : found_) {
@@ -94,49 +41,72 @@ std::vector<MemoryBlock> BlockFinder::blocks() {
     return merged;
 }
 
-void write_image(const std::string& path, const std::string& header, const std::string& text,
-                 const std::vector<MemoryBlock>& blocks) {
-    FileOutput output(path);
-    output.put(header.data(), header.size());
+void write_image(const std::string& path, const std::string& header, ImageWriter& writer) {
+    std::ofstream file(path, std::ios::binary);
+    if (!file) throw std::runtime_error("it cannot be written");
+    CheckSum check;
+    auto put = [&](const void* data, size_t n) {
+        check.take(data, n);
+        file.write(static_cast<const char*>(data), static_cast<std::streamsize>(n));
+    };
+    const auto blocks = writer.blocks();
+    const std::string& text = writer.text();
     const uint64_t sizes[2] = {text.size(), blocks.size()};
-    output.put(sizes, sizeof sizes);
-    output.put(text.data(), text.size());
+    put(header.data(), header.size());
+    put(sizes, sizeof sizes);
+    put(text.data(), text.size());
     for (const MemoryBlock& block : blocks) {
-        const BlockHeader own{block.end - block.begin, block.begin % kPage, block.changes};
-        output.put(&own, sizeof own);
-        output.put(reinterpret_cast<const void*>(block.begin), own.size);
+        const BlockHeader own{block.begin, block.end - block.begin, block.changes};
+        put(&own, sizeof own);
+        put(reinterpret_cast<const void*>(block.begin), own.size);
     }
-    output.end();
+    const uint64_t sum = check.sum();
+    put(&sum, sizeof sum);
+    if (!file.flush()) throw std::runtime_error("it cannot be written to its end");
 }
 
-ImageText read_image(const std::string& path, const std::string& header,
-                     std::vector<OwnBlock>& blocks) {
-    FileInput input(path);
-    std::string found(header.size(), '\0');
-    if (input.left() < header.size()) throw std::runtime_error("it ends too early");
-    input.get(found.data(), found.size());
-    if (found != header)
+uint64_t read_image(const std::string& path, const std::string& header, std::string& text,
+                    std::vector<OwnBlock>& blocks) {
+    std::error_code unknown;
+    if (!std::filesystem::is_regular_file(path, unknown))
+        throw std::runtime_error("there is no such file");
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw std::runtime_error("it cannot be read");
+    size_t left = std::filesystem::file_size(path);
+    CheckSum check;
+    auto get = [&](void* data, size_t n) {
+        if (n > left || !file.read(static_cast<char*>(data), static_cast<std::streamsize>(n)))
+            throw std::runtime_error("it ends too early");
+        left -= n;
+        check.take(data, n);
+    };
+    auto get_text = [&](std::string& into, size_t n) {
+        if (n > left) throw std::runtime_error("it ends too early");
+        into.resize(n);
+        get(into.data(), n);
+    };
+    get_text(text, std::min(left, header.size()));
+    if (!header.starts_with(text))
         throw std::runtime_error("it is no prepared line of this version of Catenary");
     uint64_t sizes[2];
-    input.get(sizes, sizeof sizes);
-    if (sizes[0] > input.left() || sizes[1] > input.left() / sizeof(BlockHeader))
-        throw std::runtime_error("it ends too early");
-    std::string text(sizes[0], '\0');
-    input.get(text.data(), text.size());
+    get(sizes, sizeof sizes);
+    get_text(text, sizes[0]);
     for (uint64_t k = 0; k < sizes[1]; ++k) {
         BlockHeader own;
-        input.get(&own, sizeof own);
-        if (own.size > input.left() || own.place_in_page >= kPage)
-            throw std::runtime_error("it ends too early");
+        get(&own, sizeof own);
+        if (own.size > left) throw std::runtime_error("it ends too early");
         auto memory = std::make_unique<std::byte[]>(own.size + 2 * kPage);
         const auto start = reinterpret_cast<uintptr_t>(memory.get());
         const size_t page = (kPage - start % kPage) % kPage;
-        std::byte* bytes = memory.get() + page + own.place_in_page;
-        input.get(bytes, own.size);
-        blocks.push_back({std::move(memory), {bytes, own.size}, own.changes != 0});
+        std::byte* bytes = memory.get() + page + own.stood % kPage;
+        get(bytes, own.size);
+        blocks.push_back({own.stood, std::move(memory), {bytes, own.size}, own.changes != 0});
     }
-    const uint64_t sum = input.end();
-    return {std::move(text), sum};
+    const uint64_t expected = check.sum();
+    uint64_t sum;
+    get(&sum, sizeof sum);
+    if (sum != expected) throw std::runtime_error("it is damaged");
+    return sum;
 }
 
 }  // namespace catenary

@@ -2,8 +2,9 @@
 // Records with all arrays that they point to, as a file.
 //
 // Arrays that share memory still share it when read: overlapping ones are kept as one block of
-// bytes, and a record's array as a part of a block. Blocks stand in memory where they stood, modulo
-// pages of 4096 bytes, as arrays that are walked through side by side are placed for the caches.
+// bytes, with the address where it stood, and a record's array by its own. Blocks stand in memory
+// where they stood, modulo pages of 4096 bytes, as arrays that are walked through side by side are
+// placed for the caches.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -33,120 +34,72 @@ class CheckSum {
 
 /// Pass all members of a value to a visitor: `bytes(T&)` for plain values, `array(T*&, n)` for
 /// arrays of n numbers, and `count(size_t&)` for lengths, upon which a reader resizes. Pointers to
-/// objects are left out. `scratch(bool)` of one that has it is called around records that are
-/// `kScratch`.
-template <class Visitor, class T>
-void visit(Visitor& visitor, T& value);
-
-template <class Visitor, class T>
-void visit_value(Visitor& visitor, std::span<T>& value) {
-    size_t n = value.size();
-    visitor.count(n);
-    T* data = value.data();
-    visitor.array(data, n);
-    value = {data, n};
-}
-template <class Visitor, TableType T>
-void visit_value(Visitor& visitor, T& value) {
-    std::apply([&](auto&... size) { (visitor.bytes(size), ...); }, value.sizes());
-    visitor.array(value.data, value.all().size());
-}
-template <class Visitor, class T>
-void visit_value(Visitor& visitor, std::vector<T>& value) {
-    size_t n = value.size();
-    visitor.count(n);
-    value.resize(n);
-    for (T& one : value) visit(visitor, one);
-}
-template <class Visitor, class T>
-void visit_value(Visitor& visitor, std::optional<T>& value) {
-    size_t n = value.has_value();
-    visitor.count(n);
-    if (n && !value) value.emplace();
-    if (n) visit(visitor, *value);
-}
-template <class Visitor, class A, class B>
-void visit_value(Visitor& visitor, std::pair<A, B>& value) {
-    visit(visitor, value.first);
-    visit(visitor, value.second);
-}
-template <class Visitor, class T>
-void visit_value(Visitor&, T*&) {}
-template <class Visitor, class T>
-void visit_value(Visitor&, std::vector<T*>&) {}
-template <class Visitor, class T>
-    requires(!RecordType<T> && !TableType<T> && !std::is_pointer_v<T>) &&
-            std::is_trivially_copyable_v<T>
-void visit_value(Visitor& visitor, T& value) {
-    visitor.bytes(value);
-}
-template <class Visitor, RecordType T>
-void visit_value(Visitor& visitor, T& value) {
-    constexpr bool is_scratch = requires { T::kScratch; };
-    if constexpr (is_scratch && requires { visitor.scratch(true); }) visitor.scratch(true);
-    std::apply([&](auto&... member) { (visit(visitor, member), ...); }, value.members());
-    if constexpr (is_scratch && requires { visitor.scratch(true); }) visitor.scratch(false);
-}
-
+/// objects are left out.
 template <class Visitor, class T>
 void visit(Visitor& visitor, T& value) {
-    visit_value(visitor, value);
+    auto visit_all = [&](auto&... own) { (visit(visitor, own), ...); };
+    if constexpr (RecordType<T>) {
+        std::apply(visit_all, value.members());
+    } else if constexpr (TableType<T>) {
+        std::apply([&](auto&... size) { (visitor.bytes(size), ...); }, value.sizes());
+        visitor.array(value.data, value.all().size());
+    } else if constexpr (requires { value.subspan(0); }) {
+        size_t n = value.size();
+        visitor.count(n);
+        auto* data = value.data();
+        visitor.array(data, n);
+        value = {data, n};
+    } else if constexpr (requires { value.resize(0); }) {
+        size_t n = value.size();
+        visitor.count(n);
+        value.resize(n);
+        for (auto& one : value) visit(visitor, one);
+    } else if constexpr (requires { value.has_value(); }) {
+        size_t n = value.has_value();
+        visitor.count(n);
+        if (n && !value) value.emplace();
+        if (n) visit(visitor, *value);
+    } else if constexpr (requires { value.second; }) {
+        visit_all(value.first, value.second);
+    } else if constexpr (!std::is_pointer_v<T>) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        visitor.bytes(value);
+    }
 }
 
 /// A part of memory that arrays share.
 struct MemoryBlock {
     uintptr_t begin, end;
-    bool changes;  ///< whether any array in it is written, and read in a later step
+    bool changes;  ///< whether any array in it is written
 };
 
-/// Finds the blocks of all arrays.
-class BlockFinder {
-  public:
-    template <class T>
-    void bytes(T&) {}
-    void count(size_t&) {}
-    void scratch(bool is) { is_scratch_ = is; }
-    template <class T>
-    void array(T*& data, size_t n) {
-        if (n == 0) return;
-        const auto begin = reinterpret_cast<uintptr_t>(data);
-        found_.push_back({begin, begin + n * sizeof(T), !std::is_const_v<T> && !is_scratch_});
-    }
-    /// All of them, in the order of memory.
-    std::vector<MemoryBlock> blocks();
-
-  private:
-    std::vector<MemoryBlock> found_;
-    bool is_scratch_ = false;
-};
-
-/// Writer of a record's members as bytes, with arrays as parts of blocks.
+/// Writer of a record's members as bytes, with arrays as where they stand in memory.
 class ImageWriter {
   public:
-    explicit ImageWriter(std::vector<MemoryBlock> blocks) : blocks_(std::move(blocks)) {}
     template <class T>
     void bytes(T& value) {
-        const auto* from = reinterpret_cast<const char*>(&value);
-        text_.append(from, sizeof(T));
+        text_.append(reinterpret_cast<const char*>(&value), sizeof(T));
     }
     void count(size_t& n) { bytes(n); }
     template <class T>
     void array(T*& data, size_t n) {
         if (n == 0) return;
+        bytes(data);
         const auto begin = reinterpret_cast<uintptr_t>(data);
-        auto block = std::ranges::upper_bound(blocks_, begin, {}, &MemoryBlock::begin) - 1;
-        uint64_t place[2] = {static_cast<uint64_t>(block - blocks_.begin()), begin - block->begin};
-        bytes(place);
+        found_.push_back({begin, begin + n * sizeof(T), !std::is_const_v<T>});
     }
     const std::string& text() const { return text_; }
+    /// Blocks of all arrays, in the order of memory.
+    std::vector<MemoryBlock> blocks();
 
   private:
-    std::vector<MemoryBlock> blocks_;
     std::string text_;
+    std::vector<MemoryBlock> found_;
 };
 
-/// Blocks that were read, in memory of their own.
+/// A block that was read, in memory of its own, and where it stood when it was written.
 struct OwnBlock {
+    uintptr_t stood;
     std::unique_ptr<std::byte[]> memory;
     std::span<std::byte> bytes;
     bool changes;
@@ -172,13 +125,15 @@ class ImageReader {
     void array(T*& data, size_t n) {
         data = nullptr;
         if (n == 0) return;
-        uint64_t place[2];
-        bytes(place);
-        const uint64_t block = place[0], begin = place[1];
-        if (block >= blocks_.size() || n > blocks_[block].bytes.size() / sizeof(T) ||
-            begin > blocks_[block].bytes.size() - n * sizeof(T))
+        uintptr_t stood;
+        bytes(stood);
+        const auto next = std::ranges::upper_bound(blocks_, stood, {}, &OwnBlock::stood);
+        if (next == blocks_.begin()) throw std::runtime_error("an array in it has no block");
+        const OwnBlock& block = *(next - 1);
+        const size_t begin = stood - block.stood, size = block.bytes.size();
+        if (begin > size || n > (size - begin) / sizeof(T))
             throw std::runtime_error("an array in it is beyond its block");
-        data = reinterpret_cast<T*>(blocks_[block].bytes.data() + begin);
+        data = reinterpret_cast<T*>(block.bytes.data() + begin);
     }
 
   private:
@@ -187,38 +142,31 @@ class ImageReader {
     std::vector<OwnBlock>& blocks_;
 };
 
-/// Write a file with a header of one line, the bytes of `writer` and the blocks. Throws
+/// Write a file with a header of one line, and what was written of a record with its blocks. Throws
 /// std::runtime_error if it cannot be written.
-void write_image(const std::string& path, const std::string& header, const std::string& text,
-                 const std::vector<MemoryBlock>& blocks);
-/// Bytes of such a file, and its checksum.
-struct ImageText {
-    std::string bytes;
-    uint64_t sum;
-};
-/// Read such a file, which begins with this header; returns the bytes and fills in the blocks.
-/// Throws std::runtime_error if it cannot be read, has another header, or was damaged.
-ImageText read_image(const std::string& path, const std::string& header,
-                     std::vector<OwnBlock>& blocks);
+void write_image(const std::string& path, const std::string& header, ImageWriter& writer);
+/// Read such a file, which begins with this header; fills in the bytes of the record and the
+/// blocks, and returns the file's checksum. Throws std::runtime_error if it cannot be read, has
+/// another header, or was damaged.
+uint64_t read_image(const std::string& path, const std::string& header, std::string& text,
+                    std::vector<OwnBlock>& blocks);
 
 /// Write a record.
 template <class T>
 void write_record(const std::string& path, const std::string& header, T& record) {
-    BlockFinder finder;
-    visit(finder, record);
-    const auto blocks = finder.blocks();
-    ImageWriter writer(blocks);
+    ImageWriter writer;
     visit(writer, record);
-    write_image(path, header, writer.text(), blocks);
+    write_image(path, header, writer);
 }
 /// Read it, with the memory of its arrays; returns the checksum of the file.
 template <class T>
 uint64_t read_record(const std::string& path, const std::string& header, T& record,
                      std::vector<OwnBlock>& blocks) {
-    ImageText text = read_image(path, header, blocks);
-    ImageReader reader(std::move(text.bytes), blocks);
+    std::string text;
+    const uint64_t sum = read_image(path, header, text, blocks);
+    ImageReader reader(std::move(text), blocks);
     visit(reader, record);
-    return text.sum;
+    return sum;
 }
 
 }  // namespace catenary

@@ -24,44 +24,6 @@ std::string header() {
 
 }  // namespace
 
-HeadParts parts_of(const Head& head) {
-    HeadParts parts{};
-    parts.arrays = head.arrays();
-    parts.first = head.first();
-    parts.bending = head.bending();
-    parts.regulation = head.regulation();
-    parts.lowering = head.lowering();
-    if (const auto* chain = dynamic_cast<const LinearChain*>(&head)) parts.linear = chain->linear();
-    if (const auto* sprung = dynamic_cast<const SprungHead*>(&head)) {
-        parts.masses = sprung->masses();
-        parts.laws = sprung->laws();
-    }
-    if (const auto* chain = dynamic_cast<const LawfulChain*>(&head))
-        parts.carrier = chain->carrier();
-    if (const auto* raised = dynamic_cast<const RaisedHead*>(&head))
-        parts.mechanism = raised->mechanism();
-    return parts;
-}
-
-std::unique_ptr<Head> head_of(const HeadParts& parts) {
-    std::unique_ptr<Head> head;
-    if (parts.linear)
-        head = std::make_unique<LinearChain>(parts.arrays, *parts.linear);
-    else if (parts.masses && parts.laws && parts.carrier)
-        head =
-            std::make_unique<LawfulChain>(parts.arrays, *parts.masses, *parts.laws, *parts.carrier);
-    else if (parts.masses && parts.laws && parts.mechanism)
-        head = std::make_unique<RaisedHead>(parts.arrays, *parts.masses, *parts.laws,
-                                            *parts.mechanism);
-    else
-        throw std::runtime_error("a pantograph in it has no model");
-    head->set_first(parts.first);
-    if (parts.bending) head->bend(*parts.bending);
-    if (parts.regulation) head->regulate(*parts.regulation);
-    if (parts.lowering) head->lower(*parts.lowering);
-    return head;
-}
-
 void write_line(const std::string& path, PreparedLine& line) {
     write_record(path, header(), line);
 }
@@ -92,15 +54,15 @@ void Simulation::make_steps() {
     if (ahead.look_steps < 1) throw std::runtime_error("it never looks at its wires");
     try {
         free_ = std::make_unique<TwoPasses>(line_.passes);
-        for (const HeadParts& head : line_.heads) heads_.push_back(head_of(head));
+        for (const HeadParts& head : line_.heads) heads_.push_back(std::make_unique<Head>(head));
     } catch (const std::invalid_argument& error) {
         throw std::runtime_error(error.what());
     }
     free_->track(line_.tracked);
     if (line_.window) free_->open(*line_.window);
     parts.free = free_.get();
-    room_ = std::make_unique<Room>(size(parts.problem.unknowns.right));
-    parts.problem.unknowns.room = room_.get();
+    room_ = std::make_unique<Room>(size(parts.switched));
+    parts.problem.room = room_.get();
     parts.heads.clear();
     for (const auto& head : heads_) parts.heads.push_back(head.get());
     inputs_.resize(n);
@@ -161,7 +123,8 @@ void Simulation::drive_next() {
         drive.roof_velocity += input.base_velocity;
         drive.head_air += input.head_force;
         // In full at all times, unlike what a regulation of the scene adds.
-        (line_.heads[k].mechanism ? drive.arm_air : drive.force) += input.lift_force;
+        const auto& sprung = line_.heads[k].sprung;
+        (sprung && sprung->mechanism ? drive.arm_air : drive.force) += input.lift_force;
     }
 }
 

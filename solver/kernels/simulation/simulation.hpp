@@ -7,30 +7,10 @@
 // waits.
 #include <string>
 
-#include "heads/raised_head.hpp"
 #include "simulation/image.hpp"
 #include "steps/steps.hpp"
 
 namespace catenary {
-
-/// A head in a file. Its model follows from the optional records that it has.
-struct HeadParts {
-    HeadArrays arrays;
-    int64_t first;
-    std::optional<LinearStep> linear;
-    std::optional<SprungMasses> masses;
-    std::optional<HeadLaws> laws;
-    std::optional<int64_t> carrier;
-    std::optional<ReducedMechanism> mechanism;
-    std::optional<Bending> bending;
-    std::optional<Regulation> regulation;
-    std::optional<Lowering> lowering;
-    CATENARY_RECORD(arrays, first, linear, masses, laws, carrier, mechanism, bending, regulation,
-                    lowering)
-};
-/// Parts of a head, and the head of such parts.
-HeadParts parts_of(const Head& head);
-std::unique_ptr<Head> head_of(const HeadParts& parts);
 
 /// A pantograph's spring and damper to its base, if it is a chain that is tied to it.
 struct Tie {

@@ -15,6 +15,8 @@ Steps::Steps(StepParts parts, Block block)
     const int64_t n = size(parts_.contacts.x), n_heads = static_cast<int64_t>(parts_.heads.size());
     refuse_unless(size(parts_.strips) == 2 * n * (1 + n), "strips are of other contacts");
     refuse_unless(block_.drives.rows == n_heads, "a block drives other heads than its steps have");
+    refuse_unless(parts_.problem.room && size(parts_.switched) >= parts_.problem.room->k,
+                  "there is no room for links that switch");
     for (const Head* head : parts_.heads) {
         refuse_unless(head && head->first() >= 0 && head->first() + head->n_strips() <= n,
                       "a head has other contacts than the train");
@@ -112,7 +114,7 @@ int64_t Steps::find_forces(int64_t number) {
 void Steps::finish(int64_t n_compensations) {
     const SmallProblem& problem = parts_.problem;
     const int64_t n = size(problem.found.depth);
-    const std::span<const double> solution = problem.unknowns.solution, force = solution.first(n);
+    const std::span<const double> solution = problem.room->solution, force = solution.first(n);
     superpose(parts_.contacts, force);
     if (n_compensations)
         compensate(parts_.contacts, parts_.switched.first(n_compensations),

@@ -32,7 +32,7 @@ struct StepParts {
     std::vector<std::span<const double>> channels;  ///< numbers of further channels
     CATENARY_RECORD(speed, contacts, train, free, loads, heads, strips, problem, law, lateral_place,
                     switched, train_outputs, outputs, shown, channels)
-    CATENARY_SHAPES("*, n=n, n=n.., *, *, *, *, n=n k=k, n=n, n?, k..")
+    CATENARY_SHAPES("*, n=n, n=n.., *, *, *, *, n=n, n=n, n?")
 };
 
 /// Inputs and outputs of a block of steps.

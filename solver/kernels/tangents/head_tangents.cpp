@@ -11,8 +11,8 @@ namespace {
 
 /// Contact forces that a head's laws read; empty without laws.
 std::span<double> pressed_of(const Head& head) {
-    const auto* sprung = dynamic_cast<const SprungHead*>(&head);
-    return sprung && !sprung->laws().law.empty() ? sprung->laws().pressed : std::span<double>{};
+    const auto& sprung = head.parts().sprung;
+    return sprung && !sprung->laws.law.empty() ? sprung->laws.pressed : std::span<double>{};
 }
 
 /// By how much a state is changed to differentiate a step: heights and their rates little beside
@@ -31,8 +31,7 @@ HeadTangents::HeadTangents(std::vector<Head*> heads, std::vector<std::vector<Hea
         throw std::invalid_argument("tangents have pairs of other heads than the steps");
     for (size_t h = 0; h < n(); ++h) {
         const Head& head = *heads_[h];
-        chains_.push_back(dynamic_cast<const LinearChain*>(&head));
-        if (!chains_.back() && pairs_[h].size() != 2)
+        if (!head.parts().linear && pairs_[h].size() != 2)
             throw std::invalid_argument("a head is no linear chain and has no pair");
         pressed_.emplace_back(pressed_of(head).size());
         row_.resize(std::max<size_t>(row_.size(), kDrive + 2 * head.n_strips()));
@@ -54,12 +53,12 @@ void HeadTangents::predict(std::span<const HeadChange> changes, Array2<double> d
         const std::span<const double> drive = drives[h];
         std::span<const double> own;
         if (changed.rows > 0) own = changed[h];
-        if (!chains_[h]) {
+        if (!heads_[h]->parts().linear) {
             step_beside(changes[h], drive, own, h, gaps);
             continue;
         }
         const Drive none{};
-        step_chain(*chains_[h], changes[h], *reinterpret_cast<const Drive*>(drive.data()),
+        step_chain(changes[h], *reinterpret_cast<const Drive*>(drive.data()),
                    own.empty() ? none : *reinterpret_cast<const Drive*>(own.data()), h, gaps);
     }
 }
@@ -87,10 +86,10 @@ double HeadTangents::height(size_t h, const HeadChange& change) const {
 }
 
 /// Differentiate the step of a linear chain.
-void HeadTangents::step_chain(const LinearChain& chain, const HeadChange& change,
-                              const Drive& drive, const Drive& changed, size_t h,
-                              const GapChange& gaps) {
-    const LinearStep& step = chain.linear();
+void HeadTangents::step_chain(const HeadChange& change, const Drive& drive, const Drive& changed,
+                              size_t h, const GapChange& gaps) {
+    const Head& chain = *heads_[h];
+    const LinearStep& step = *chain.parts().linear;
     const HeadArrays& arrays = chain.arrays();
     const NewmarkFactors& newmark = arrays.newmark;
     const int64_t n = chain.n(), s = chain.n_strips(), first = chain.first();

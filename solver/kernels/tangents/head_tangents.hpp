@@ -2,7 +2,7 @@
 // Derivatives of the heads' steps by parameters of a march.
 #include <vector>
 
-#include "heads/chains.hpp"
+#include "heads/head.hpp"
 
 namespace catenary {
 
@@ -47,8 +47,8 @@ class HeadTangents {
     double height(size_t h, const HeadChange& change) const;
 
   private:
-    void step_chain(const LinearChain& chain, const HeadChange& change, const Drive& drive,
-                    const Drive& changed, size_t h, const GapChange& gaps);
+    void step_chain(const HeadChange& change, const Drive& drive, const Drive& changed, size_t h,
+                    const GapChange& gaps);
     void step_beside(const HeadChange& change, std::span<const double> drive,
                      std::span<const double> changed, size_t h, const GapChange& gaps);
     void take_step(Head& head, std::span<const double> drive, size_t h) const;
@@ -61,7 +61,6 @@ class HeadTangents {
     std::vector<Head*> heads_;
     std::vector<std::vector<Head*>> pairs_;
     std::span<const double> force_;
-    std::vector<const LinearChain*> chains_;    ///< of heads that are linear chains, else null
     std::vector<std::vector<double>> before_;   ///< states before the step
     std::vector<std::vector<double>> pressed_;  ///< contact forces that their laws read then
     std::vector<std::vector<double>> free_;     ///< derivatives of states without contact

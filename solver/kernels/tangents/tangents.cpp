@@ -43,7 +43,7 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
             if (tangent.heads.size() != heads_.n())
                 throw std::invalid_argument("a tangent has other heads than the steps");
     }
-    const int64_t n = n_contacts(), most = size(own.problem.unknowns.right);
+    const int64_t n = n_contacts(), most = own.problem.room->k;
     for (auto* numbers : {&place_, &rate_}) numbers->resize(n);
     for (auto* numbers : {&right_, &solution_}) numbers->resize(most);
     side_by_side_.resize(most * kMostScenes);
@@ -70,7 +70,7 @@ void TangentSteps::find_acting() {
     acting_.contacts.clear();
     acting_.rows.clear();
     acting_.numbers.clear();
-    const auto acts = problem.unknowns.room->acts;
+    const auto acts = problem.room->acts;
     for (int64_t i = 0; i < n_contacts(); ++i) {
         acts[i] = force()[i] != 0.0 || (problem.pulls && problem.share.present[i] != 0.0);
         if (acts[i]) acting_.contacts.push_back(i);
@@ -96,10 +96,10 @@ void TangentSteps::count() {
 void TangentSteps::fill_matrix() const {
     const SmallProblem& problem = parts().problem;
     const Tangents& tangents = problem.tangents;
-    press(problem.gap, tangents, problem.unknowns);
+    press(problem.gap, tangents, *problem.room);
     if (n_compensations() > 0)
         couple(problem.share.rows, n_compensations(), problem.coupled, tangents.by_depth,
-               tangents.by_rate, problem.unknowns);
+               tangents.by_rate, *problem.room);
 }
 
 /// Take a group of tangents through the step that was taken.
@@ -160,14 +160,14 @@ Array2<const double> TangentSteps::changed_drives(const Tangent& tangent, int64_
 
 /// Solve the small problem of a tangent.
 void TangentSteps::solve(const Tangent& tangent, const Motion& own) {
-    const auto& [always, behind, matrix, unused, solution, room] = parts().problem.unknowns;
+    const Room& room = *parts().problem.room;
     const auto& released = parts().problem.coupled.released;
     for (int64_t i : acting_.contacts) right_[i] = of_law(tangent, i);
     for (size_t k = 0; k < acting_.rows.size(); ++k)
         right_[n_contacts() + acting_.rows[k]] =
             -released[acting_.numbers[k]] * of_reserve(tangent, own, acting_.numbers[k]);
     const int64_t n = n_contacts() + n_compensations();
-    solve_on({matrix, right_, solution_}, room->acts.first(n), *room);
+    solve_on({room.matrix, right_, solution_}, room.acts.first(n), room);
 }
 
 /// Add the loads of a tangent by the march's forces, whose links or places change.

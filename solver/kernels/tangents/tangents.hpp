@@ -98,7 +98,7 @@ class TangentSteps : public Steps {
     void show(const Tangent& tangent, int64_t number) const;
     void show_arms(const TangentGroup& group, int64_t number) const;
 
-    std::span<const double> force() const { return parts().problem.unknowns.solution; }
+    std::span<const double> force() const { return parts().problem.room->solution; }
     int64_t n_contacts() const { return size(parts().problem.found.depth); }
 
     MarchTangents tangents_;

@@ -288,7 +288,7 @@ def test_a_prepared_file_is_the_scene_that_it_was_made_of(
         other.step(100)
         assert np.array_equal(sim.contact_force, other.contact_force)
     (tmp_path / "b.line").write_bytes(b"spam")
-    for name, says in (("b.line", "ends too early|no prepared line"), ("c.line", "no such file")):
+    for name, says in (("b.line", "no prepared line"), ("c.line", "no such file")):
         with pytest.raises(catenary.InputError, match=says):
             catenary.Simulation(str(tmp_path / name))
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from catenary.mbs.head.head_arrays import drive_width, named
+from catenary.mbs.head.newmark_head import head_of
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
@@ -24,7 +25,7 @@ def free_mass(mass: float, roll: int = -1) -> tuple[native.Head, np.ndarray, np.
     matrix = np.array([[1.0, DT, 0.25 * DT**2], [0.0, 1.0, 0.5 * DT], [0.0, 0.0, 0.0]])
     unit = np.array([0.25 * DT**2, 0.5 * DT, 1.0]) / mass
     linear = native.LinearStep(matrix, unit, unit.copy(), np.array([[1.0 / mass]]))
-    return native.LinearChain(arrays, linear), state, out
+    return head_of(arrays, linear=linear), state, out
 
 
 def test_a_head_keeps_its_arrays_alive_and_writes_to_them() -> None:
