@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.mbs.head.newmark_head import Raising, parts_of
+from catenary.mbs.head.newmark_head import Raising
 
 # Wind [m/s] with the train and across it, (n,) each, at places [m] and times [s], (n,) each.
 WindAt = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -169,10 +169,8 @@ class AirForces:
     def at(self, times: np.ndarray) -> np.ndarray:
         """Upward forces on head and on what carries it [N], and the forces on bodies in parts of
         those at the train's speed in still air; (n, 3) at growing ``times`` (n,) [s]."""
-        parts = parts_of(self._part, times)[:, None]
-        if self._steady is not None:
-            return np.asarray(parts * self._steady)
-        return np.asarray(parts * self._acting(times))
+        acting = self._acting(times) if self._steady is None else self._steady
+        return np.asarray(self._part(times)[:, None] * acting)
 
     def now(self, time: float) -> np.ndarray:
         """Forces at one ``time`` [s], (3,), as ``at`` returns them."""

@@ -8,14 +8,13 @@ and it moves with the base.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from catenary.mbs.called_model import CalledModel
 from catenary.mbs.head.head_arrays import drive_width, named
-from catenary.mbs.head.newmark_head import Raising, SteppedHead
+from catenary.mbs.head.newmark_head import Part, Raising, SteppedHead
 from catenary.mbs.interface import HeadState, Pantograph
 from catenary.mbs.vehicle.base_motion import BaseMotion, lifted
 from catenary.solver.kernels import native
@@ -34,17 +33,17 @@ class Lowering:
     within: float
     drop: float
 
-    def course(self, static_force: float, raise_time: float) -> Callable[[float], float]:
-        """Part of the lift that acts as a function of time [s], after a raising over ``raise_time``
-        [s] to ``static_force`` [N]."""
+    def course(self, static_force: float, raise_time: float) -> Part:
+        """Part of the lift that acts, after a raising over ``raise_time`` [s] to ``static_force``
+        [N]."""
         rising, falling = Raising(raise_time), Raising(self.within)
         before = rising(self.time)
         last = self.force / static_force
 
-        def part(time: float) -> float:
-            if time <= self.time:
-                return rising(time)
-            return before + (last - before) * falling(time - self.time)
+        def part(times: float | np.ndarray) -> np.ndarray:
+            since = np.maximum(times - np.float64(self.time), 0.0)
+            lowered = before + (last - before) * falling(since)
+            return np.where(since > 0.0, lowered, rising(times))
 
         return part
 
@@ -123,8 +122,7 @@ class LoweredPantograph:
         """Fill in what steps to ``times`` [s] depend on, see `SteppedHead`."""
         if self._base is not None:
             rows = named(drives)
-            motions = np.array([lifted(self._base, time) for time in times.tolist()])
-            rows["roof"], rows["roof_velocity"] = motions.T
+            rows["roof"], rows["roof_velocity"], _ = self._base.lifts(times)
         if isinstance(self.model, SteppedHead):
             self.model.fill_drives(times, drives)
 

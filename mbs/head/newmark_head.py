@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from catenary.mbs.control import Controller, Regulation, Regulator
 from catenary.mbs.head.head_arrays import N_DRIVE, drive_width, named
-from catenary.mbs.head.laws import LawsInPlace, in_place
+from catenary.mbs.head.laws import Law, in_place
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.interface import HeadState
 from catenary.solver.kernels import native
 
+# Part of the lift that acts at times [s], shape as these.
+Part = Callable[[float | np.ndarray], np.ndarray]
 # A step that takes no time: what it finds are the accelerations of the state as it is.
 _NO_TIME = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -45,7 +46,7 @@ class SteppedHead(ABC):
         self.strip_offsets = head.offsets
         # The place of the wire on strips of a head that cannot roll makes no difference.
         moves = head.roll >= 0 or head.bending is not None
-        self._part: Callable[[float], float] = Raising(raise_time)
+        self._part: Part = Raising(raise_time)
         self._n, self._lateral = n, lateral if moves else None
         self._level = np.ones(n)
         self._level[: head.n] = head.level
@@ -64,11 +65,9 @@ class SteppedHead(ABC):
         self._arrays = native.HeadArrays(
             self._touch, self._state, self.head.numbers, self._newmark, roll
         )
-        # Inputs of the coming step, and the numbers of these that have names.
         self.row = np.zeros(drive_width(s))
-        self._now = named(self.row)
-        self._laws: LawsInPlace = in_place((), (), n, ())
-        self._law_arrays = self._laws.arrays(s)
+        self._rows = named(self.row[None])
+        self._laws = in_place((), (), n, (), s)
         self._bending = None if self._lateral is None else head.bending
         self._control: native.Regulation | None = None
         self._controller: Controller | None = None
@@ -110,8 +109,8 @@ class SteppedHead(ABC):
         elif regulator is not None:
             self._controller = regulator()
 
-    def follow(self, part: Callable[[float], float]) -> None:
-        """Scale the lift by ``part(time)``."""
+    def follow(self, part: Part) -> None:
+        """Scale the lift by ``part``."""
         self._part = part
 
     @property
@@ -125,9 +124,16 @@ class SteppedHead(ABC):
         """Force that the regulation of the lift adds to the static force now [N]."""
         return self.stepped.added_force
 
-    def _put_laws(self, laws: LawsInPlace) -> None:
-        """Add nonlinear laws on the coordinates of the head and of the masses below."""
-        self._laws, self._law_arrays = laws, laws.arrays(len(self.strip_offsets))
+    @property
+    def _has_laws(self) -> bool:
+        return self._laws.law.size > 0
+
+    def _put_laws(
+        self, laws: Sequence[Law], numbers: Sequence[int], rest: Sequence[float] | np.ndarray
+    ) -> None:
+        """Add nonlinear laws on head and masses, with the coordinates ``numbers`` and at the
+        heights ``rest`` [m] under the static force."""
+        self._laws = in_place(laws, numbers, self._n, rest, len(self.strip_offsets))
 
     @property
     def position(self) -> np.ndarray:
@@ -153,7 +159,7 @@ class SteppedHead(ABC):
         self._state[n : 2 * n] = velocity * self._level
         # A start from any other acceleration than what these forces cause loses an order in dt.
         still = self._sprung(self._arrays._replace(newmark=_NO_TIME))
-        self._put_drive(0.0)
+        self._put_drives(np.zeros(1), self._rows)
         if not still.step(self.row):
             self._refuse(still, 0.0)
         still.advance(np.zeros(len(self.strip_offsets)))
@@ -167,7 +173,7 @@ class SteppedHead(ABC):
             A mechanism has left the heights that it can reach.
         """
         self._aim(time)
-        self._put_drive(time)
+        self._put_drives(np.array([time]), self._rows)
         if not self.stepped.step(self.row):
             self._refuse(self.stepped, time)
         return self.head
@@ -180,18 +186,17 @@ class SteppedHead(ABC):
         """A compiled head on its springs and laws, by the factors of Newmark's method in arrays."""
 
     @abstractmethod
-    def _put_drive(self, time: float) -> None:
-        """Put into ``row`` what a step to ``time`` [s] depends on besides the state and wires."""
+    def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
+        """Put into ``rows`` (n,) what steps to ``times`` (n,) [s] depend on besides the state and
+        wires."""
 
-    @abstractmethod
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what steps to ``times`` [s] depend on besides the state, a row each.
 
-        ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with.
+        ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with; of heads
+        that roll or bend it has what is known of where wires cross their strips.
         """
-
-    def _fill_lateral(self, times: np.ndarray, drives: np.ndarray) -> None:
-        """Fill in what is known of where wires cross the strips of a head that rolls or bends."""
+        self._put_drives(times, named(drives))
         if self._lateral is not None:
             s = len(self.strip_offsets)
             self._lateral.fill_ahead(times, drives[:, N_DRIVE : N_DRIVE + 2 * s])
@@ -215,8 +220,8 @@ class SteppedHead(ABC):
         """Positions, velocities and accelerations (3 n,); behind them the latest contact forces of
         a head with laws, and what regulates the lift remembers."""
         parts = [self._state]
-        if self._laws.laws:
-            parts.append(self._law_arrays.pressed)
+        if self._has_laws:
+            parts.append(self._laws.pressed)
         if self._control is not None:
             parts += [self._control.memory.view(float), self._control.waiting]
         elif self._controller is not None:
@@ -228,8 +233,8 @@ class SteppedHead(ABC):
         """Continue from what ``state`` returned."""
         begin = self._state.size
         self._state[:] = state[:begin]
-        if self._laws.laws:
-            pressed = self._law_arrays.pressed
+        if self._has_laws:
+            pressed = self._laws.pressed
             pressed[:] = state[begin : begin + pressed.size]
             begin += pressed.size
         if self._control is not None:
@@ -249,28 +254,15 @@ class SteppedHead(ABC):
             self.row[N_DRIVE + s :] = self._lateral.rate
 
 
-def _half_cosine(time: Any, raise_time: float) -> Any:
-    """From 0 to 1 over ``raise_time``, at one time or at several [s]."""
-    return 0.5 * (1.0 - np.cos(np.pi * time / raise_time))
-
-
 @dataclass(frozen=True)
 class Raising:
-    """Part of the lift that acts at a time [s]: a half cosine from 0 to 1 over ``raise_time``."""
+    """Part of the lift that acts: a half cosine from 0 to 1 over ``raise_time`` [s]."""
 
     raise_time: float
 
-    def __call__(self, time: float) -> float:
-        """The part at ``time`` [s]."""
-        if time >= self.raise_time:
-            return 1.0
-        return float(_half_cosine(time, self.raise_time))
-
-
-def parts_of(part: Callable[[float], float], times: np.ndarray) -> np.ndarray:
-    """The parts of the lift at ``times`` (n,) [s], which grow, shape (n,)."""
-    if not isinstance(part, Raising):
-        return np.array([part(time) for time in times.tolist()])
-    parts, n = np.ones(times.size), int(np.searchsorted(times, part.raise_time))
-    parts[:n] = _half_cosine(times[:n], part.raise_time)
-    return parts
+    def __call__(self, times: float | np.ndarray) -> np.ndarray:
+        """The parts at ``times`` [s], shape as these."""
+        if self.raise_time <= 0.0:
+            return np.ones(np.shape(times))
+        early = np.minimum(times, self.raise_time)
+        return np.asarray(0.5 * (1.0 - np.cos(np.pi * early / self.raise_time)))

@@ -24,11 +24,8 @@ from catenary.mbs.rigid.bodies import SPACE, Vector, rotation_matrix
 from catenary.mbs.rigid.kinematics import (
     Law,
     Quantity,
-    applied_to,
     cross,
-    difference,
     part_of,
-    stacked,
 )
 
 AXES = np.eye(3)
@@ -245,12 +242,16 @@ class PointOnCurve(MadeRows):
 
     def rows(self, products: Quantity, time: float) -> Quantity:
         """Phi with its derivatives."""
-        x, y, z = (part_of(products, slice(k, k + 1)) for k in range(3))
-        curves = []
-        for coordinate, spline in zip((y, z), self._splines, strict=True):
-            law = Law(*(float(spline(x.value[0], k)) for k in range(3)))
-            curves.append(difference(coordinate, applied_to(x, law)))
-        return stacked(curves)
+        x, across = part_of(products, slice(0, 1)), part_of(products, slice(1, 3))
+        curve, slope, bend = (
+            np.array([spline(x.value[0], k) for spline in self._splines]) for k in range(3)
+        )
+        return Quantity(
+            across.value - curve,
+            across.jacobian - slope[:, None] * x.jacobian,
+            across.rate - slope * x.rate,
+            across.drift - (slope * x.drift + bend * x.rate**2),
+        )
 
 
 @dataclass(frozen=True)

@@ -67,21 +67,6 @@ def point(motion: Motion, body: str, local: Vector) -> Quantity:
     return body_products(motion, rows)
 
 
-def difference(a: Quantity, b: Quantity) -> Quantity:
-    """a - b."""
-    return Quantity(*(x - y for x, y in zip(a, b, strict=True)))
-
-
-def applied_to(a: Quantity, f: Law) -> Quantity:
-    """f(a) of one number a, given f and its derivatives there."""
-    return Quantity(
-        np.array([f.value]),
-        f.first * a.jacobian,
-        f.first * a.rate,
-        f.first * a.drift + f.second * a.rate**2,
-    )
-
-
 def stacked(parts: list[Quantity]) -> Quantity:
     """All numbers of several quantities, one after the other."""
     return Quantity(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))

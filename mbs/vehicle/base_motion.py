@@ -103,6 +103,10 @@ class BaseMotion:
         """Upward motion at ``time`` [s]."""
         return self._sum(self._vertical, time)
 
+    def lifts(self, times: np.ndarray) -> np.ndarray:
+        """Upward motions at ``times`` (n,) [s], (3, n)."""
+        return np.array([self.vertical(time) for time in times.tolist()]).T
+
     def lateral(self, time: float) -> Motion:
         """Motion to the left at ``time`` [s]."""
         return self._sum(self._lateral, time)
