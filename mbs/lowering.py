@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.mbs.called_model import CalledModel
+from catenary.mbs.called_model import called_by_kernels
 from catenary.mbs.head.head_arrays import drive_width, named
 from catenary.mbs.head.newmark_head import Part, Raising, SteppedHead
 from catenary.mbs.interface import HeadState, Pantograph
@@ -69,15 +69,13 @@ class LoweredPantograph:
         if isinstance(model, SteppedHead):
             self._head, self._row, self.stepped = model.head, model.row, model.stepped
         else:
-            called = CalledModel(model)
-            self._head, self._row = called.head, np.zeros(drive_width(len(model.strip_offsets)))
-            self.stepped = called.stepped()
+            self.stepped, self._head, _ = called_by_kernels(model)
+            self._row = np.zeros(drive_width(len(model.strip_offsets)))
         self._now, self._memory = named(self._row), np.zeros(1, dtype=native.LOWERING_MEMORY)
         self.stepped.lower(native.Lowering(lowering.time, lowering.drop, self._memory))
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
-        """Places of the strips ahead of the pantograph's own place [m]."""
         return self.model.strip_offsets
 
     @property
@@ -92,7 +90,6 @@ class LoweredPantograph:
         self._memory["height"] = head_height - lifted(self._base, 0.0)[0]
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Heights and velocities (s,) of the strips at ``time`` [s] from the motion alone."""
         if not self.is_caught:
             return self.model.extrapolate(time)
         place, velocity = lifted(self._base, time)
@@ -132,7 +129,6 @@ class LoweredPantograph:
         return np.append(self.model.state(), self._memory.view(float))
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         self.model.restore(np.asarray(state)[:-3])
         self._memory.view(float)[:] = state[-3:]
 
@@ -141,5 +137,4 @@ class LoweredPantograph:
         return self.model.places()
 
     def base(self, time: float) -> float:
-        """Height of the model's base [m]."""
         return self.model.base(time)

@@ -31,8 +31,3 @@ class Heads(HeadState):
         self.velocity[strips] = head.velocity
         self.height_compliance[strips, strips] = head.height_compliance
         self.velocity_compliance[strips, strips] = head.velocity_compliance
-
-    def adopt(self, head: HeadState) -> None:
-        """Stand for the strips of the only pantograph there is: its arrays themselves."""
-        if head.numbers is not self.numbers:
-            self.take(head.numbers, self.n)

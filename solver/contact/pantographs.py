@@ -19,7 +19,7 @@ from catenary.mbs.build import (
     make_pantograph,
     steady_forces,
 )
-from catenary.mbs.called_model import CalledModel
+from catenary.mbs.called_model import called_by_kernels
 from catenary.mbs.head.head_arrays import N_DRIVE, named
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.stepping import Stepping
@@ -247,9 +247,6 @@ class Pantographs:
 
     def predict(self, time: float) -> Heads:
         """Strips at ``time`` as functions of the contact forces. Rank 0 only."""
-        if len(self.models) == 1:
-            self._heads.adopt(self.models[0].predict(time))
-            return self._heads
         for model, strips in self._models_with_contacts:
             self._heads.put(strips, model.predict(time))
         return self._heads
@@ -266,11 +263,8 @@ class Pantographs:
         depth : ndarray, shape (n_contacts,)
             Heights of the strips above the wire at the contacts [m].
         """
-        if len(self.models) == 1:
-            self.models[0].advance(contact_force)
-        else:
-            for model, strips in self._models_with_contacts:
-                model.advance(contact_force[strips])
+        for model, strips in self._models_with_contacts:
+            model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.measure_joints()
         self._write_outputs(contact_force, reported, self._heads.affine, depth)
@@ -295,9 +289,9 @@ class Pantographs:
                 heads.append(moved.stepped)
                 places.append(moved.places())
             else:
-                called = CalledModel(model, partial(self._measure_joint, number))
-                heads.append(called.stepped())
-                places.append(called.places)
+                head, _, own = called_by_kernels(model, partial(self._measure_joint, number))
+                heads.append(head)
+                places.append(own)
             heads[-1].first = strips.start
         return heads, places
 
