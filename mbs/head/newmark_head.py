@@ -208,7 +208,6 @@ class SteppedHead(ABC):
         return self._early[0], self._early[1]
 
     def advance(self, contact_force: np.ndarray) -> None:
-        """Take the step predicted last with these contact forces (s,) [N]."""
         self.stepped.advance(np.ascontiguousarray(contact_force, dtype=float))
         if self._controller is not None:
             height = float((self._touch[0] @ self.position).mean())
@@ -230,7 +229,6 @@ class SteppedHead(ABC):
         return np.concatenate(parts)
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         begin = self._state.size
         self._state[:] = state[:begin]
         if self._has_laws:

@@ -45,7 +45,6 @@ class _Carried:
     base: BaseMotion
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
         forces = np.zeros((len(self.masses), 6))
         forces[:, 1] = self.base.lateral(time).acceleration
         forces[:, 2] = self.base.vertical(time).acceleration
@@ -139,7 +138,6 @@ class FullPantograph:
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
-        """Places of the strips ahead of the pantograph's own place [m]."""
         return self._data.strips.contact_offsets
 
     @property
@@ -218,7 +216,6 @@ class FullPantograph:
         return self._early[0], self._early[1]
 
     def predict(self, time: float) -> HeadState:
-        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""
         self._aim(time)
         # The loop's clock counts: a restart begins at any time.
         self._stepper.time = time - self._dt
@@ -252,7 +249,6 @@ class FullPantograph:
         return np.concatenate([stepper.motion.to_vector(), *more])
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         stepper, n = self._stepper, self.motion.n_bodies
         values = np.array(state, dtype=float)
         stepper.motion = stepper.motion.restored(values[: 13 * n])

@@ -110,7 +110,6 @@ class Spherical(_BetweenPoints):
     n_lengths: ClassVar[int] = 3
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         return same_point(self.i, self.at_i, self.j, self.at_j)
 
 
@@ -123,7 +122,6 @@ class Revolute(_BetweenPoints):
     n_lengths: ClassVar[int] = 3
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         return [
             *same_point(self.i, self.at_i, self.j, self.at_j),
             *across_axis(self.i, across(self.axis_i), self.j, unit(self.axis_j)),
@@ -138,7 +136,6 @@ class PointOnLine(_BetweenPoints):
     n_lengths: ClassVar[int] = 2
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         return across_gap(self.i, across(self.axis_i), self.j, self.at_j, self.i, self.at_i)
 
 
@@ -156,7 +153,6 @@ class Prismatic(_BetweenPoints):
     n_lengths: ClassVar[int] = 2
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         normals = across(self.axis_i)
         side = cross(unit(self.axis_i), unit(self.normal_i))
         return [
@@ -180,7 +176,6 @@ class RevolutePrismatic(_BetweenPoints):
     n_lengths: ClassVar[int] = 2
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         slide, turn = across(self.slide_axis_j), across(self.turn_axis_j)
         return [
             *across_gap(self.j, slide, self.i, self.at_i, self.j, self.at_j),
@@ -204,7 +199,6 @@ class Fixed:
     n_lengths: ClassVar[int] = 3
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         axes_i = rotation_matrix(np.asarray(self.parameters)).T
         return [
             *same_point(self.j, self.at_j, self.i, self.at_i),
@@ -241,7 +235,6 @@ class PointOnCurve(MadeRows):
         return same_point(self.body, self.at, SPACE, ORIGIN)
 
     def rows(self, products: Quantity, time: float) -> Quantity:
-        """Phi with its derivatives."""
         x, across = part_of(products, slice(0, 1)), part_of(products, slice(1, 3))
         curve, slope, bend = (
             np.array([spline(x.value[0], k) for spline in self._splines]) for k in range(3)
@@ -269,7 +262,6 @@ class PrescribedPoint:
     n_lengths: ClassVar[int] = 1
 
     def products(self) -> list[Product]:
-        """The scalar product of its row."""
         return [Product(SPACE, unit(self.along), self.body, self.at, SPACE, ORIGIN, self.law)]
 
 
