@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.mbs.head.newmark_head import Raising
+from catenary.mbs.head.stepping import Raising
 
 # Wind [m/s] with the train and across it, (n,) each, at places [m] and times [s], (n,) each.
 WindAt = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -154,6 +154,10 @@ class AirForces:
 
     They grow from zero while the pantograph is raised, and act on while it is lowered.
 
+    Attributes
+    ----------
+    is_steady : whether they stay as they are from then on
+
     Parameters
     ----------
     flow : Airflow
@@ -163,6 +167,7 @@ class AirForces:
 
     def __init__(self, flow: Airflow, uplift: Uplift | None, raise_time: float) -> None:
         self._flow, self._uplift, self._part = flow, uplift, Raising(raise_time)
+        self.is_steady = flow.steady
         self._steady = self._acting(np.zeros(1))[0] if flow.steady else None
         self._latest = (np.nan, np.zeros(3))
 

@@ -51,9 +51,9 @@ class LumpedPantograph(SteppedHead):
     ) -> None:
         head = data.head(rolls=stepping.lateral is not None)
         n = head.n + data.n_masses - 1
-        super().__init__(head, n, stepping)
-        self._lift_full = static_force
+        super().__init__(head, n, stepping, air is None or air.is_steady)
         self._air = air
+        self._lift_full = static_force
         # The lift acts on the last mass, which is the head itself if there is no other.
         own = int(np.flatnonzero(head.level)[-1])
         self._carrier = n - 1 if data.n_masses > 1 else own
@@ -72,6 +72,8 @@ class LumpedPantograph(SteppedHead):
         self._base_height = nominal_height + compression
         # A base that rises with the lift starts from where the chain was placed.
         self._tied, self._started_at = data.tied, self._base_height
+        if self._tied:
+            self._settled += 2.0 * _MOMENT
         if data.laws:
             first = nominal_height + data.strips.compression(pressing)
             rest = np.cumsum([first, *data.given_way(pressing)])

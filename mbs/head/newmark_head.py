@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from catenary.mbs.control import Controller, Regulation, Regulator
 from catenary.mbs.head.head_arrays import N_DRIVE, drive_width, named
 from catenary.mbs.head.laws import Law, in_place
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import Part, Raising, Stepping
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.interface import HeadState
 from catenary.solver.kernels import native
 
-# Part of the lift that acts at times [s], shape as these.
-Part = Callable[[float | np.ndarray], np.ndarray]
 # A step that takes no time: what it finds are the accelerations of the state as it is.
 _NO_TIME = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -36,11 +33,12 @@ class SteppedHead(ABC):
     head : HeadParts
     n : number of all coordinates; those that are not the head's are heights
     stepping : Stepping
+    steady_air : whether forces of the air, if there are any, stay as they are once it is raised
     """
 
     stepped: native.Head
 
-    def __init__(self, head: HeadParts, n: int, stepping: Stepping) -> None:
+    def __init__(self, head: HeadParts, n: int, stepping: Stepping, steady_air: bool) -> None:
         raise_time, dt, beta, gamma, lateral, self._base = stepping
         s = len(head.offsets)
         self.strip_offsets = head.offsets
@@ -67,6 +65,9 @@ class SteppedHead(ABC):
         )
         self.row = np.zeros(drive_width(s))
         self._rows = named(self.row[None])
+        # The time of what is in it, and when that stays as it is.
+        self._driven = -np.inf
+        self._settled = raise_time if steady_air and self._base is None else np.inf
         self._laws = in_place((), (), n, (), s)
         self._bending = None if self._lateral is None else head.bending
         self._control: native.Regulation | None = None
@@ -111,7 +112,7 @@ class SteppedHead(ABC):
 
     def follow(self, part: Part) -> None:
         """Scale the lift by ``part``."""
-        self._part = part
+        self._part, self._settled = part, np.inf
 
     @property
     def tie(self) -> tuple[float, float]:
@@ -159,7 +160,7 @@ class SteppedHead(ABC):
         self._state[n : 2 * n] = velocity * self._level
         # A start from any other acceleration than what these forces cause loses an order in dt.
         still = self._sprung(self._arrays._replace(newmark=_NO_TIME))
-        self._put_drives(np.zeros(1), self._rows)
+        self._drive(0.0)
         if not still.step(self.row):
             self._refuse(still, 0.0)
         still.advance(np.zeros(len(self.strip_offsets)))
@@ -173,7 +174,8 @@ class SteppedHead(ABC):
             A mechanism has left the heights that it can reach.
         """
         self._aim(time)
-        self._put_drives(np.array([time]), self._rows)
+        if min(time, self._driven) < self._settled:
+            self._drive(time)
         if not self.stepped.step(self.row):
             self._refuse(self.stepped, time)
         return self.head
@@ -184,6 +186,10 @@ class SteppedHead(ABC):
     @abstractmethod
     def _sprung(self, arrays: native.HeadArrays) -> native.Head:
         """A compiled head on its springs and laws, by the factors of Newmark's method in arrays."""
+
+    def _drive(self, time: float) -> None:
+        self._put_drives(np.array([time]), self._rows)
+        self._driven = time
 
     @abstractmethod
     def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
@@ -250,17 +256,3 @@ class SteppedHead(ABC):
             s = self._lateral.place.size
             self.row[N_DRIVE : N_DRIVE + s] = self._lateral.place
             self.row[N_DRIVE + s :] = self._lateral.rate
-
-
-@dataclass(frozen=True)
-class Raising:
-    """Part of the lift that acts: a half cosine from 0 to 1 over ``raise_time`` [s]."""
-
-    raise_time: float
-
-    def __call__(self, times: float | np.ndarray) -> np.ndarray:
-        """The parts at ``times`` [s], shape as these."""
-        if self.raise_time <= 0.0:
-            return np.ones(np.shape(times))
-        early = np.minimum(times, self.raise_time)
-        return np.asarray(0.5 * (1.0 - np.cos(np.pi * early / self.raise_time)))

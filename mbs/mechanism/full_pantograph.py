@@ -15,8 +15,7 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import ON_FRAME, ON_HEAD, SQUARE, AirForces
-from catenary.mbs.head.newmark_head import Part, Raising
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import Part, Raising, Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
 from catenary.mbs.rigid.bodies import SPACE, Motion

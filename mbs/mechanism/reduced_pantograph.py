@@ -66,9 +66,9 @@ class RaisingPantograph(SteppedHead):
     def __init__(self, data: RaisingData, stepping: Stepping, air: AirForces | None = None) -> None:
         roll = data.head.roll if stepping.lateral is not None else None
         head = head_parts(*data.head[:3], data.strips, roll)
-        super().__init__(head, head.n + 1, stepping)
-        self._data = data
+        super().__init__(head, head.n + 1, stepping, air is None or air.is_steady)
         self._air = air
+        self._data = data
         self._zero = data.head.offset + data.base_height
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(data.laws, (head_number, head.n), data.rest)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from catenary.mbs.build import Operation, make_pantograph
-from catenary.mbs.head.newmark_head import Raising
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import Raising, Stepping
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion

@@ -78,3 +78,24 @@ def test_lift_rises_as_half_a_cosine_and_stays() -> None:
     root = np.sqrt(0.5)
     expected = [0.0, 60.0 * (1 - root), 60.0, 60.0 * (1 + root), 120.0, 120.0]
     assert found == pytest.approx(expected, abs=120 * 4 * EPS)
+
+
+def test_a_pantograph_that_is_placed_again_is_raised_again() -> None:
+    """Once it is raised its drives stay as they are, but not from one run to the next."""
+    data = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
+    pantograph = LumpedPantograph(data, 120.0, 5.5, Stepping(raise_time=0.02, dt=DT))
+
+    def march(begin: int) -> list[np.ndarray]:
+        states = []
+        for number in range(begin, 60):
+            pantograph.predict((number + 1) * DT)
+            pantograph.advance(np.array([100.0]))
+            states.append(pantograph.state())
+        return states
+
+    pantograph.place(5.5)
+    first = march(0)
+    pantograph.place(5.5)
+    assert np.array_equal(march(0), first)
+    pantograph.restore(first[4])
+    assert np.array_equal(march(5), first[5:])
