@@ -28,7 +28,6 @@ from catenary.mbs.rigid.statics import (
     Calibration,
     calibrate_actuator,
     equilibrium,
-    held_force,
     unheld_force,
 )
 from catenary.mbs.rigid.system import Miss, System
@@ -171,13 +170,13 @@ def stand(data: MultibodyData) -> Standing:
         system, motion = system.with_force_changed(data.actuator, force=push), found.motion
         mechanism.calibration = found
     else:
-        force = before = held_force(system, holder, mechanism.motion)
+        motion, multipliers = equilibrium(held, mechanism.motion)
+        force = before = float(multipliers[-1])
         if force <= 0.0:
             raise InputError(
                 f"its static force is {force:.4g} N at its working height of {height:g} m: its "
                 "actuators cannot raise it"
             )
-        motion = equilibrium(held, mechanism.motion).motion
     if mechanism.head is None or not _is_at(motion, mechanism.head[0]):
         head = _head(data, system, holder, motion)
         mechanism.head = motion, head, system.n_degrees_of_freedom(motion)

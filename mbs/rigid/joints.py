@@ -24,7 +24,6 @@ from catenary.mbs.rigid.bodies import SPACE, Vector, rotation_matrix
 from catenary.mbs.rigid.kinematics import (
     Law,
     Quantity,
-    cross,
     part_of,
 )
 
@@ -154,7 +153,7 @@ class Prismatic(_BetweenPoints):
 
     def products(self) -> list[Product]:
         normals = across(self.axis_i)
-        side = cross(unit(self.axis_i), unit(self.normal_i))
+        side = np.cross(unit(self.axis_i), unit(self.normal_i))
         return [
             *across_gap(self.i, normals, self.j, self.at_j, self.i, self.at_i),
             *across_axis(self.i, normals, self.j, unit(self.axis_j)),
@@ -285,6 +284,6 @@ class PrescribedAngle:
     def products(self) -> list[Product]:
         """The turned normal across ``normal_i``."""
         forward = unit(self.normal_i)
-        side = cross(unit(self.axis_i), forward)
+        side = np.cross(unit(self.axis_i), forward)
         normal = np.cos(self.angle) * side - np.sin(self.angle) * forward
         return across_axis(self.i, [normal], self.j, unit(self.normal_j))

@@ -36,12 +36,6 @@ class Law(NamedTuple):
     second: float
 
 
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a x b of two vectors (3,): what numpy's does, in a tenth of its time."""
-    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
-    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
-
-
 def number_of(motion: Motion, body: str) -> int:
     """Number of a body; raises InputError for a name that there is not."""
     if body not in motion.numbers:

@@ -128,8 +128,7 @@ def lifted(base: BaseMotion | None, time: float) -> tuple[float, float]:
     """Lift [m] and upward velocity [m/s] of a base at ``time`` [s], both zero without one."""
     if base is None:
         return 0.0, 0.0
-    vertical = base.vertical(time)
-    return float(vertical.place), float(vertical.velocity)
+    return base.vertical(time)[:2]
 
 
 def _course(

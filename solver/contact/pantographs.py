@@ -31,7 +31,7 @@ from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.kernels import native
-from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw
+from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
@@ -396,21 +396,15 @@ def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseM
 
 
 def nominal_height_rule(
-    wires: ContactWires,
-    elasticity: Elasticity,
-    air_speed: float | None = None,
-    contact: ContactLaw | None = None,
-    *,
-    with_laws: bool = True,
+    problem: Problem, simulated: Simulated, wires: ContactWires, elasticity: Elasticity
 ) -> Callable[[Placement], float]:
     """Head height at which the static force is defined.
 
     That of the placement, or else the mean height of a head that lifts the contact wires in the
-    stretch of ``elasticity`` with the static force and that of still air at ``air_speed`` [m/s], so
+    stretch of ``elasticity`` with the static force and that of still air at the train's speed, so
     that the base spring neither adds to the mean force nor takes from it. The head of a chain that
-    is tied to its base stands above the wires by the depth of its ``contact`` law; others change
-    their force by less than a hundredth over that depth, which is left out. ``with_laws`` says
-    whether laws of pantographs that are not linear act.
+    is tied to its base stands above the wires by the depth of its contact law; others change
+    their force by less than a hundredth over that depth, which is left out.
     """
     x = elasticity.x
     at_rest = np.stack([wires.rest_height_of(wire, x) for wire in range(wires.n_wires)], axis=1)
@@ -419,13 +413,13 @@ def nominal_height_rule(
         if placement.nominal_height is not None:
             return placement.nominal_height
         force = placement.static_force
-        if air_speed is not None and placement.data.meets_air:
-            force += steady_forces(placement.data, air_speed).whole
+        data = _simulated(placement, simulated, wires.n_wires)
+        if simulated.meets_air and data.meets_air:
+            force += steady_forces(data, problem.train.speed).whole
         lifted = elasticity.pressed(at_rest, force)
         above = 0.0
-        data = placement.data if with_laws else replace(placement.data, laws=())
-        if contact is not None and isinstance(data, LumpedData) and data.tied:
-            above = contact.depth(force / (len(placement.data.strips.offsets) * wires.n_wires))
+        if isinstance(data, LumpedData) and data.tied:
+            above = problem.contact.depth(force / len(data.strips.contact_offsets))
         # By trapezoids; scipy.integrate, which has the rule, loads solvers for 0.03 s.
         mean = float(np.sum(np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0) / (x[-1] - x[0]))
         return mean + above

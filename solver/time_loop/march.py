@@ -114,13 +114,9 @@ class March:
         self._form = form
         self.ownership = distribute(model, comm.size, comm.rank)
         self._wire = ContactWires(model, form, self.ownership)
-        air_speed = problem.train.speed if model.simulated.meets_air else None
-        effects = model.simulated
-        height = nominal_height_rule(
-            self._wire, elasticity, air_speed, problem.contact, with_laws=effects.pantograph_laws
-        )
+        height = nominal_height_rule(problem, model.simulated, self._wire, elasticity)
         self._nominal_height = height
-        self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
+        self._pantographs = Pantographs(comm, problem, model.simulated, self._wire, height)
         self._moving = MovingColumns()
         self._set_ups = SchemeFactory(comm, form, self.ownership, self._nominal_height)
         # Arrays of a long line are large, so that the first parts take these.
