@@ -28,10 +28,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.base.errors import InputError, NotConverged, RunBroken
+from catenary.base.errors import NotConverged, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.kinematics import Quantity
-from catenary.mbs.rigid.step_solvers import StepSolver, step_solver
+from catenary.mbs.rigid.step_solvers import METHODS, StepSolver
 from catenary.mbs.rigid.system import System
 
 # Generalised forces (6 n, s) of unit forces at a motion.
@@ -79,11 +79,6 @@ class Stepper:
     ways : generalised forces of unit forces that are given step by step; none if left out
     substeps : into how many a step is cut
     beta, gamma : Newmark's parameters
-
-    Raises
-    ------
-    InputError
-        A step that is not positive, or no substep.
     """
 
     def __init__(
@@ -96,12 +91,8 @@ class Stepper:
         beta: float = 0.25,
         gamma: float = 0.5,
     ) -> None:
-        if dt <= 0.0 or substeps < 1:
-            raise InputError(
-                f"A step of {dt:g} s in {substeps} substeps is none: both must be positive."
-            )
         self.system = system
-        self._solver = step_solver(solver) if isinstance(solver, str) else solver
+        self._solver = METHODS[solver]() if isinstance(solver, str) else solver
         self._ways = ways or (lambda motion: np.zeros((6 * motion.n_bodies, 0)))
         self._dt, self._substeps = dt, substeps
         self._beta, self._gamma = beta, gamma

@@ -20,11 +20,6 @@ class Heads(HeadState):
         self.early_height = np.zeros(n)
         self.early_velocity = np.zeros(n)
 
-    @property
-    def n(self) -> int:
-        """Number of contacts."""
-        return int(self.height.size)
-
     def put(self, strips: slice, head: HeadState) -> None:
         """Copy the state of one pantograph's head to its ``strips``."""
         self.height[strips] = head.height

@@ -52,7 +52,7 @@ class Case:
     coupling: np.ndarray
 
     def solve(self) -> InnerSolution:
-        law = LinearInSteps(self.law, self.heads.n, pulls=not self.may_lose_contact)
+        law = LinearInSteps(self.law, self.heads.height.size, pulls=not self.may_lose_contact)
         return InnerProblem(law, coupled(self.coupling, self.kept)).solve(self.line, self.heads)
 
     def violation(self, found: InnerSolution) -> float:
