@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.mbs.head.newmark_head import Raising, parts_of
+from catenary.mbs.head.stepping import Raising
 
 # Wind [m/s] with the train and across it, (n,) each, at places [m] and times [s], (n,) each.
 WindAt = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -154,6 +154,10 @@ class AirForces:
 
     They grow from zero while the pantograph is raised, and act on while it is lowered.
 
+    Attributes
+    ----------
+    is_steady : whether they stay as they are from then on
+
     Parameters
     ----------
     flow : Airflow
@@ -163,16 +167,15 @@ class AirForces:
 
     def __init__(self, flow: Airflow, uplift: Uplift | None, raise_time: float) -> None:
         self._flow, self._uplift, self._part = flow, uplift, Raising(raise_time)
+        self.is_steady = flow.steady
         self._steady = self._acting(np.zeros(1))[0] if flow.steady else None
         self._latest = (np.nan, np.zeros(3))
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Upward forces on head and on what carries it [N], and the forces on bodies in parts of
         those at the train's speed in still air; (n, 3) at growing ``times`` (n,) [s]."""
-        parts = parts_of(self._part, times)[:, None]
-        if self._steady is not None:
-            return np.asarray(parts * self._steady)
-        return np.asarray(parts * self._acting(times))
+        acting = self._acting(times) if self._steady is None else self._steady
+        return np.asarray(self._part(times)[:, None] * acting)
 
     def now(self, time: float) -> np.ndarray:
         """Forces at one ``time`` [s], (3,), as ``at`` returns them."""

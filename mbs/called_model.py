@@ -10,36 +10,22 @@ from catenary.mbs.interface import HeadState, Pantograph
 from catenary.solver.kernels import native
 
 
-class CalledModel:
-    """Any pantograph in a loop of kernels.
+def called_by_kernels(
+    model: Pantograph, after: Callable[[], None] = lambda: None
+) -> tuple[native.Head, HeadState, np.ndarray]:
+    """Any pantograph in a loop of kernels, which calls ``after`` after each step: its head, the
+    latest prediction, and ``Pantograph.places`` at the end of the latest step, in one array."""
+    head, places = HeadState(len(model.strip_offsets)), np.array(model.places())
 
-    Attributes
-    ----------
-    head : its latest prediction
-    places : ``Pantograph.places`` at the end of the latest step, kept in one array
+    def predict(time: float) -> None:
+        head.numbers[:] = model.predict(time).numbers
 
-    Parameters
-    ----------
-    model : the pantograph
-    after : called after each step
-    """
+    def advance(contact_force: np.ndarray) -> None:
+        model.advance(contact_force)
+        places[:] = model.places()
+        after()
 
-    def __init__(self, model: Pantograph, after: Callable[[], None] = lambda: None) -> None:
-        self.head = HeadState(len(model.strip_offsets))
-        self.places = np.array(model.places())
-        self._model, self._after = model, after
-
-    def stepped(self) -> native.Head:
-        """A head that calls this, and keeps it: no collector sees a cycle of both."""
-        s = len(self._model.strip_offsets)
-        still = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
-        arrays = native.HeadArrays(np.zeros((2, s, 0)), np.zeros(0), self.head.numbers, still, -1)
-        return native.CalledHead(arrays, self._predict, self._advance)
-
-    def _predict(self, time: float) -> None:
-        self.head.numbers[:] = self._model.predict(time).numbers
-
-    def _advance(self, contact_force: np.ndarray) -> None:
-        self._model.advance(contact_force)
-        self.places[:] = self._model.places()
-        self._after()
+    still = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
+    strips = np.zeros((2, len(model.strip_offsets), 0))
+    arrays = native.HeadArrays(strips, np.zeros(0), head.numbers, still, -1)
+    return native.CalledHead(arrays, predict, advance), head, places

@@ -43,11 +43,6 @@ class Regulation:
     delay: float = 0.0
     from_time: float = 0.0
 
-    @property
-    def n_delayed(self) -> int:
-        """The delay in samples."""
-        return round(self.delay / self.sample_time)
-
     def arrays(self, dt: float) -> native.Regulation:
         """The controller before its first step, for steps of ``dt`` [s] from time 0 on."""
         settings = np.zeros(1, dtype=native.REGULATION)
@@ -60,7 +55,9 @@ class Regulation:
         gains = np.array(list(self.gains), dtype=native.CONTROL_GAINS)
         memory = np.zeros(1, dtype=native.REGULATION_MEMORY)
         memory["next"], memory["samples"] = self.from_time, -1.0
-        return native.Regulation(settings, gains, memory, np.zeros(self.n_delayed))
+        return native.Regulation(
+            settings, gains, memory, np.zeros(round(self.delay / self.sample_time))
+        )
 
 
 class Controller(Protocol):

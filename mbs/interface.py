@@ -33,11 +33,8 @@ class HeadState:
     """
 
     def __init__(self, n_strips: int) -> None:
-        self.take(np.zeros(2 * n_strips * (1 + n_strips)), n_strips)
-
-    def take(self, numbers: np.ndarray, n_strips: int) -> None:
-        """Stand for ``numbers`` (2 s + 2 s^2,) of ``n_strips`` strips, s, in place of its own."""
-        self.numbers, self.affine = numbers, affine(numbers, n_strips)
+        self.numbers = np.zeros(2 * n_strips * (1 + n_strips))
+        self.affine = affine(self.numbers, n_strips)
         self.height, self.velocity, self.height_compliance, self.velocity_compliance = self.affine
 
 

@@ -8,14 +8,14 @@ and it moves with the base.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.mbs.called_model import CalledModel
+from catenary.mbs.called_model import called_by_kernels
 from catenary.mbs.head.head_arrays import drive_width, named
-from catenary.mbs.head.newmark_head import Raising, SteppedHead
+from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.head.stepping import Part, Raising
 from catenary.mbs.interface import HeadState, Pantograph
 from catenary.mbs.vehicle.base_motion import BaseMotion, lifted
 from catenary.solver.kernels import native
@@ -34,17 +34,17 @@ class Lowering:
     within: float
     drop: float
 
-    def course(self, static_force: float, raise_time: float) -> Callable[[float], float]:
-        """Part of the lift that acts as a function of time [s], after a raising over ``raise_time``
-        [s] to ``static_force`` [N]."""
+    def course(self, static_force: float, raise_time: float) -> Part:
+        """Part of the lift that acts, after a raising over ``raise_time`` [s] to ``static_force``
+        [N]."""
         rising, falling = Raising(raise_time), Raising(self.within)
         before = rising(self.time)
         last = self.force / static_force
 
-        def part(time: float) -> float:
-            if time <= self.time:
-                return rising(time)
-            return before + (last - before) * falling(time - self.time)
+        def part(times: float | np.ndarray) -> np.ndarray:
+            since = np.maximum(times - np.float64(self.time), 0.0)
+            lowered = before + (last - before) * falling(since)
+            return np.where(since > 0.0, lowered, rising(times))
 
         return part
 
@@ -70,15 +70,13 @@ class LoweredPantograph:
         if isinstance(model, SteppedHead):
             self._head, self._row, self.stepped = model.head, model.row, model.stepped
         else:
-            called = CalledModel(model)
-            self._head, self._row = called.head, np.zeros(drive_width(len(model.strip_offsets)))
-            self.stepped = called.stepped()
+            self.stepped, self._head, _ = called_by_kernels(model)
+            self._row = np.zeros(drive_width(len(model.strip_offsets)))
         self._now, self._memory = named(self._row), np.zeros(1, dtype=native.LOWERING_MEMORY)
         self.stepped.lower(native.Lowering(lowering.time, lowering.drop, self._memory))
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
-        """Places of the strips ahead of the pantograph's own place [m]."""
         return self.model.strip_offsets
 
     @property
@@ -93,7 +91,6 @@ class LoweredPantograph:
         self._memory["height"] = head_height - lifted(self._base, 0.0)[0]
 
     def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Heights and velocities (s,) of the strips at ``time`` [s] from the motion alone."""
         if not self.is_caught:
             return self.model.extrapolate(time)
         place, velocity = lifted(self._base, time)
@@ -123,8 +120,7 @@ class LoweredPantograph:
         """Fill in what steps to ``times`` [s] depend on, see `SteppedHead`."""
         if self._base is not None:
             rows = named(drives)
-            motions = np.array([lifted(self._base, time) for time in times.tolist()])
-            rows["roof"], rows["roof_velocity"] = motions.T
+            rows["roof"], rows["roof_velocity"], _ = self._base.lifts(times)
         if isinstance(self.model, SteppedHead):
             self.model.fill_drives(times, drives)
 
@@ -134,7 +130,6 @@ class LoweredPantograph:
         return np.append(self.model.state(), self._memory.view(float))
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         self.model.restore(np.asarray(state)[:-3])
         self._memory.view(float)[:] = state[-3:]
 
@@ -143,5 +138,4 @@ class LoweredPantograph:
         return self.model.places()
 
     def base(self, time: float) -> float:
-        """Height of the model's base [m]."""
         return self.model.base(time)

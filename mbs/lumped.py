@@ -8,10 +8,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg
 
-from catenary.mbs.air import ON_FRAME, ON_HEAD, AirForces
-from catenary.mbs.head.head_arrays import named
-from catenary.mbs.head.laws import LawsInPlace, in_place
-from catenary.mbs.head.newmark_head import SteppedHead, head_of, parts_of
+from catenary.mbs.air import AirForces
+from catenary.mbs.head.newmark_head import SteppedHead, head_of
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import lifted
@@ -53,11 +51,12 @@ class LumpedPantograph(SteppedHead):
     ) -> None:
         head = data.head(rolls=stepping.lateral is not None)
         n = head.n + data.n_masses - 1
-        super().__init__(head, n, stepping)
-        self._lift_full = static_force
+        super().__init__(head, n, stepping, air is None or air.is_steady)
         self._air = air
+        self._lift_full = static_force
         # The lift acts on the last mass, which is the head itself if there is no other.
-        self._carrier = n - 1 if data.n_masses > 1 else int(np.flatnonzero(head.level)[-1])
+        own = int(np.flatnonzero(head.level)[-1])
+        self._carrier = n - 1 if data.n_masses > 1 else own
         self._masses = np.concatenate([head.masses, data.masses[1:]])
         springs = chain_matrix(head.stiffness, data.stiffnesses[1:])
         dampers = chain_matrix(head.damping, data.dampings[1:])
@@ -73,8 +72,12 @@ class LumpedPantograph(SteppedHead):
         self._base_height = nominal_height + compression
         # A base that rises with the lift starts from where the chain was placed.
         self._tied, self._started_at = data.tied, self._base_height
+        if self._tied:
+            self._settled += 2.0 * _MOMENT
         if data.laws:
-            self._put_laws(self._in_place(data, pressing, nominal_height))
+            first = nominal_height + data.strips.compression(pressing)
+            rest = np.cumsum([first, *data.given_way(pressing)])
+            self._put_laws(data.laws, [own, *range(head.n, n)], rest)
             self._step_by(self._on_springs(self._arrays))
         else:
             self._step_by(head_of(self._arrays, linear=self.linear_step()))
@@ -82,7 +85,7 @@ class LumpedPantograph(SteppedHead):
     @property
     def is_linear(self) -> bool:
         """Whether a step is linear in its state and in what drives it."""
-        return not (self.is_regulated or self._laws.laws)
+        return not (self.is_regulated or self._has_laws)
 
     def linear_step(self) -> native.LinearStep:
         """A step without laws: new state = step @ state + drive * by_drive - by_force @ force, with
@@ -116,90 +119,38 @@ class LumpedPantograph(SteppedHead):
         """Stiffness [N/m] and damping [N s/m] between the last mass and the base."""
         return self._base_stiffness, self._base_damping
 
-    def lift(self, time: float) -> float:
-        """Net lift on the last mass at ``time`` [N]: a half cosine up to the static force."""
-        return self._lift_full * self._part(time)
-
     def place(self, head_height: float, velocity: float = 0.0) -> None:
         """Put the pantograph without contact to where its head is at this height [m]; see
         `SteppedHead`. A base that rises starts there."""
         self._started_at = head_height
         super().place(head_height, velocity)
 
-    def _put_drive(self, time: float) -> None:
-        force, now = self._drive(time), self._now
+    def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
+        part = self._part(times)
+        rows["force"] = self._lift_full * part + self._base_stiffness * self._base_height
+        if self._tied or self._base is not None:
+            roof = np.zeros((2, times.size)) if self._base is None else self._base.lifts(times)[:2]
+            base = roof + self._rise(times) if self._tied else roof
+            rows["force"] += self._base_stiffness * base[0] + self._base_damping * base[1]
+            if self._has_laws:
+                rows["base"], rows["base_velocity"] = base
+                rows["roof"], rows["roof_velocity"] = roof
         if self._air is not None:
-            on_head, on_frame, _ = self._air.now(time)
-            force += on_frame
-            now["head_air"] = on_head
-        now["force"] = force
-        if self.stepped.added_force:
-            now["part"] = self._part(time)
-        if self._laws.laws:
-            now["base"], now["base_velocity"] = self._base_motion(time)
-            now["roof"], now["roof_velocity"] = lifted(self._base, time)
-
-    def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
-        """Fill in the forces, and where the wire crosses; see `SteppedHead`."""
-        rows = named(drives)
-        if self._base is None:
-            constant = self._base_stiffness * self._base_height
-            rows["force"] = self._lift_full * parts_of(self._part, times) + constant
-        else:
-            rows["force"] = [self._drive(time) for time in times.tolist()]
-        if self._tied and self._base is None:
-            place, velocity = self._rise(times)
-            rows["force"] += self._base_stiffness * place + self._base_damping * velocity
-            if self._laws.laws:
-                rows["base"], rows["base_velocity"] = place, velocity
-        if self._air is not None:
-            forces = self._air.at(times)
-            rows["force"] += forces[:, ON_FRAME]
-            rows["head_air"] = forces[:, ON_HEAD]
-        if self._laws.laws and self._base is not None:
-            motions = np.array([self._base_motion(time) for time in times.tolist()])
-            rows["base"], rows["base_velocity"] = motions.T
-            roofs = np.array([lifted(self._base, time) for time in times.tolist()])
-            rows["roof"], rows["roof_velocity"] = roofs.T
-        if self._control is not None:
-            rows["part"] = parts_of(self._part, times)
-        self._fill_lateral(times, drives)
+            on_head, on_frame, _ = self._air.at(times).T
+            rows["force"] += on_frame
+            rows["head_air"] = on_head
+        if self.is_regulated:
+            rows["part"] = part
 
     def base(self, time: float) -> float:
         """Lift of the base by the vehicle [m]."""
         return lifted(self._base, time)[0]
-
-    def _in_place(self, data: LumpedData, static_force: float, nominal: float) -> LawsInPlace:
-        """The laws of a chain whose head is at its nominal height under the static force."""
-        head = int(np.flatnonzero(self._level[: self._n - data.n_masses + 1])[-1])
-        numbers = [head, *range(self._n - data.n_masses + 1, self._n)]
-        rest = [nominal + data.strips.compression(static_force)]
-        for way in data.given_way(static_force):
-            rest.append(rest[-1] + way)
-        return in_place(data.laws, numbers, self._n, rest)
 
     def _rise(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Height and velocity of a base that rises with the lift, above where it stands under all
         of it, at times (t,) [m], [m/s]."""
         way = self._started_at - self._base_height
         before, now, after = (
-            parts_of(self._part, np.maximum(times + shift, 0.0))
-            for shift in (-_MOMENT, 0.0, _MOMENT)
+            self._part(np.maximum(times + shift, 0.0)) for shift in (-_MOMENT, 0.0, _MOMENT)
         )
         return way * (1.0 - now), way * (before - after) / (2.0 * _MOMENT)
-
-    def _base_motion(self, time: float) -> tuple[float, float]:
-        """Lift of the base by vehicle and raising, and its speed [m], [m/s]."""
-        place, velocity = lifted(self._base, time)
-        if self._tied:
-            (rise,), (rate,) = self._rise(np.array([time]))
-            place, velocity = place + float(rise), velocity + float(rate)
-        return place, velocity
-
-    def _drive(self, time: float) -> float:
-        """Force on the last mass that its own motion has no part in, but the air's [N]."""
-        force = self.lift(time) + self._base_stiffness * self._base_height
-        if self._tied or self._base is not None:
-            place, velocity = self._base_motion(time)
-            force += self._base_stiffness * place + self._base_damping * velocity
-        return force

@@ -81,6 +81,8 @@ def study(
         if force is None:
             raise InputError(f"it has no static force at {speed:g} km/h")
         data = pantograph_of(kind, table, speed)
+        if not scene.switches()["pantograph_laws"]:
+            data = replace(data, laws=())
         if not scene.switches()["flexible_strips"]:
             data = replace(data, strips=replace(data.strips, flexure=None))
         response = head_response(data, force)
@@ -110,6 +112,8 @@ def study_text(found: PantographStudy) -> str:
             f"\nleft out: {counted(model.n_left_out, 'mode')} without stiffness that the head does "
             f"not excite, of {', '.join(model.left_out)}"
         )
+    if found.data.laws:
+        parts[-1] += "\nleft out: the pantograph's laws, which are not linear"
     head = f"lumped model fitted from {fit.lowest:g} to {fit.highest:g} Hz: {fit_error(fit)}"
     columns = zip(fit.data.masses, fit.data.stiffnesses, fit.data.dampings, strict=True)
     rows = [[k, *(f"{one:.5g}" for one in own)] for k, own in enumerate(columns, start=1)]

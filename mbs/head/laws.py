@@ -81,42 +81,14 @@ def given_way(force: float, stiffness: float, laws: Sequence[Law], mass: int) ->
     return float(ways[i] + part * (ways[i + 1] - ways[i]))
 
 
-@dataclass(frozen=True)
-class LawsInPlace:
-    """Laws on the coordinates of a pantograph that stands.
-
-    Attributes
-    ----------
-    laws : tuple of Law
-    ways : (m, n) the extension of each by each coordinate
-    by_base, by_roof : (m,) by the heights of base and roof
-    zero : (m,) the extension where each counts from [m]
-    """
-
-    laws: tuple[Law, ...]
-    ways: np.ndarray
-    by_base: np.ndarray
-    by_roof: np.ndarray
-    zero: np.ndarray
-
-    def arrays(self, n_contacts: int) -> native.HeadLaws:
-        """Arrays of the laws for kernels, with room for the forces of so many contacts."""
-        law = np.zeros(len(self.laws), dtype=native.HEAD_LAW)
-        counts = np.array([len(one.points) for one in self.laws], dtype=np.int64)
-        law["by_base"], law["by_roof"], law["zero"] = self.by_base, self.by_roof, self.zero
-        law["of_rate"] = [one.of_rate for one in self.laws]
-        law["end"] = np.cumsum(counts)
-        law["begin"] = law["end"] - counts
-        points = [pair for one in self.laws for pair in zip(one.points, one.forces, strict=True)]
-        return native.HeadLaws(
-            self.ways, law, np.array(points, dtype=native.HEAD_LAW_POINT), np.zeros(n_contacts)
-        )
-
-
 def in_place(
-    laws: Sequence[Law], numbers: Sequence[int], n: int, rest: Sequence[float]
-) -> LawsInPlace:
-    """Laws on n coordinates.
+    laws: Sequence[Law],
+    numbers: Sequence[int],
+    n: int,
+    rest: Sequence[float] | np.ndarray,
+    n_contacts: int,
+) -> native.HeadLaws:
+    """Laws on n coordinates, as kernels take them.
 
     Parameters
     ----------
@@ -128,12 +100,21 @@ def in_place(
         Number of all coordinates.
     rest : sequence of float
         Heights of the masses at rest under the static force, at the nominal height [m].
+    n_contacts : int
+        For so many contacts there is room for the latest forces.
     """
-    ways, (by_base, by_roof, zero) = np.zeros((len(laws), n)), np.zeros((3, len(laws)))
-    for j, law in enumerate(laws):
-        ways[j, numbers[law.mass]] = 1.0
-        if law.below < len(numbers):
-            ways[j, numbers[law.below]] = -1.0
+    ways, law = np.zeros((len(laws), n)), np.zeros(len(laws), dtype=native.HEAD_LAW)
+    law["of_rate"] = [one.of_rate for one in laws]
+    law["end"] = np.cumsum([len(one.points) for one in laws])
+    law["begin"][1:] = law["end"][:-1]
+    for j, one in enumerate(laws):
+        ways[j, numbers[one.mass]] = 1.0
+        if one.below < len(numbers):
+            ways[j, numbers[one.below]] = -1.0
         else:
-            (by_roof if law.of_roof else by_base)[j], zero[j] = -1.0, rest[law.mass]
-    return LawsInPlace(tuple(laws), ways, by_base, by_roof, zero)
+            law["by_roof" if one.of_roof else "by_base"][j] = -1.0
+            law["zero"][j] = rest[one.mass]
+    points = [pair for one in laws for pair in zip(one.points, one.forces, strict=True)]
+    return native.HeadLaws(
+        ways, law, np.array(points, dtype=native.HEAD_LAW_POINT), np.zeros(n_contacts)
+    )

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from catenary.mbs.control import Controller, Regulation, Regulator
 from catenary.mbs.head.head_arrays import N_DRIVE, drive_width, named
-from catenary.mbs.head.laws import LawsInPlace, in_place
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.laws import Law, in_place
+from catenary.mbs.head.stepping import Part, Raising, Stepping
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.interface import HeadState
 from catenary.solver.kernels import native
@@ -35,6 +33,7 @@ class SteppedHead(ABC):
     head : HeadParts
     n : number of all coordinates; those that are not the head's are heights
     stepping : Stepping
+    steady_air : whether forces of the air, if there are any, stay as they are once it is raised
     """
 
     stepped: native.Head
@@ -44,13 +43,13 @@ class SteppedHead(ABC):
     _carrier: int
     _mechanism: native.ReducedMechanism | None = None
 
-    def __init__(self, head: HeadParts, n: int, stepping: Stepping) -> None:
+    def __init__(self, head: HeadParts, n: int, stepping: Stepping, steady_air: bool) -> None:
         raise_time, dt, beta, gamma, lateral, self._base = stepping
         s = len(head.offsets)
         self.strip_offsets = head.offsets
         # The place of the wire on strips of a head that cannot roll makes no difference.
         moves = head.roll >= 0 or head.bending is not None
-        self._part: Callable[[float], float] = Raising(raise_time)
+        self._part: Part = Raising(raise_time)
         self._n, self._lateral = n, lateral if moves else None
         self._level = np.ones(n)
         self._level[: head.n] = head.level
@@ -69,11 +68,12 @@ class SteppedHead(ABC):
         self._arrays = native.HeadArrays(
             self._touch, self._state, self.head.numbers, self._newmark, roll
         )
-        # Inputs of the coming step, and the numbers of these that have names.
         self.row = np.zeros(drive_width(s))
-        self._now = named(self.row)
-        self._laws: LawsInPlace = in_place((), (), n, ())
-        self._law_arrays = self._laws.arrays(s)
+        self._rows = named(self.row[None])
+        # The time of what is in it, and when that stays as it is.
+        self._driven = -np.inf
+        self._settled = raise_time if steady_air and self._base is None else np.inf
+        self._laws = in_place((), (), n, (), s)
         self._bending = None if self._lateral is None else head.bending
         self._control: native.Regulation | None = None
         self._controller: Controller | None = None
@@ -115,9 +115,9 @@ class SteppedHead(ABC):
         elif regulator is not None:
             self._controller = regulator()
 
-    def follow(self, part: Callable[[float], float]) -> None:
-        """Scale the lift by ``part(time)``."""
-        self._part = part
+    def follow(self, part: Part) -> None:
+        """Scale the lift by ``part``."""
+        self._part, self._settled = part, np.inf
 
     @property
     def tie(self) -> tuple[float, float]:
@@ -130,9 +130,16 @@ class SteppedHead(ABC):
         """Force that the regulation of the lift adds to the static force now [N]."""
         return self.stepped.added_force
 
-    def _put_laws(self, laws: LawsInPlace) -> None:
-        """Add nonlinear laws on the coordinates of the head and of the masses below."""
-        self._laws, self._law_arrays = laws, laws.arrays(len(self.strip_offsets))
+    @property
+    def _has_laws(self) -> bool:
+        return self._laws.law.size > 0
+
+    def _put_laws(
+        self, laws: Sequence[Law], numbers: Sequence[int], rest: Sequence[float] | np.ndarray
+    ) -> None:
+        """Add nonlinear laws on head and masses, with the coordinates ``numbers`` and at the
+        heights ``rest`` [m] under the static force."""
+        self._laws = in_place(laws, numbers, self._n, rest, len(self.strip_offsets))
 
     @property
     def position(self) -> np.ndarray:
@@ -158,7 +165,7 @@ class SteppedHead(ABC):
         self._state[n : 2 * n] = velocity * self._level
         # A start from any other acceleration than what these forces cause loses an order in dt.
         still = self._on_springs(self._arrays._replace(newmark=_NO_TIME))
-        self._put_drive(0.0)
+        self._drive(0.0)
         if not still.step(self.row):
             self._refuse(still, 0.0)
         still.advance(np.zeros(len(self.strip_offsets)))
@@ -172,7 +179,8 @@ class SteppedHead(ABC):
             A mechanism has left the heights that it can reach.
         """
         self._aim(time)
-        self._put_drive(time)
+        if min(time, self._driven) < self._settled:
+            self._drive(time)
         if not self.stepped.step(self.row):
             self._refuse(self.stepped, time)
         return self.head
@@ -183,22 +191,25 @@ class SteppedHead(ABC):
     def _on_springs(self, arrays: native.HeadArrays) -> native.Head:
         """A compiled head on its springs and laws, by the factors of Newmark's method in arrays."""
         masses = self._masses, self._stiffness, self._damping, self._push
-        driven = self._carrier, self._law_arrays, self._mechanism
+        driven = self._carrier, self._laws, self._mechanism
         return head_of(arrays, sprung=native.SprungMasses(*masses, *driven))
 
-    @abstractmethod
-    def _put_drive(self, time: float) -> None:
-        """Put into ``row`` what a step to ``time`` [s] depends on besides the state and wires."""
+    def _drive(self, time: float) -> None:
+        self._put_drives(np.array([time]), self._rows)
+        self._driven = time
 
     @abstractmethod
+    def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
+        """Put into ``rows`` (n,) what steps to ``times`` (n,) [s] depend on besides the state and
+        wires."""
+
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what steps to ``times`` [s] depend on besides the state, a row each.
 
-        ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with.
+        ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with; of heads
+        that roll or bend it has what is known of where wires cross their strips.
         """
-
-    def _fill_lateral(self, times: np.ndarray, drives: np.ndarray) -> None:
-        """Fill in what is known of where wires cross the strips of a head that rolls or bends."""
+        self._put_drives(times, named(drives))
         if self._lateral is not None:
             s = len(self.strip_offsets)
             self._lateral.fill_ahead(times, drives[:, N_DRIVE : N_DRIVE + 2 * s])
@@ -210,7 +221,6 @@ class SteppedHead(ABC):
         return self._early[0], self._early[1]
 
     def advance(self, contact_force: np.ndarray) -> None:
-        """Take the step predicted last with these contact forces (s,) [N]."""
         self.stepped.advance(np.ascontiguousarray(contact_force, dtype=float))
         if self._controller is not None:
             height = float((self._touch[0] @ self.position).mean())
@@ -222,8 +232,8 @@ class SteppedHead(ABC):
         """Positions, velocities and accelerations (3 n,); behind them the latest contact forces of
         a head with laws, and what regulates the lift remembers."""
         parts = [self._state]
-        if self._laws.laws:
-            parts.append(self._law_arrays.pressed)
+        if self._has_laws:
+            parts.append(self._laws.pressed)
         if self._control is not None:
             parts += [self._control.memory.view(float), self._control.waiting]
         elif self._controller is not None:
@@ -232,11 +242,10 @@ class SteppedHead(ABC):
         return np.concatenate(parts)
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         begin = self._state.size
         self._state[:] = state[:begin]
-        if self._laws.laws:
-            pressed = self._law_arrays.pressed
+        if self._has_laws:
+            pressed = self._laws.pressed
             pressed[:] = state[begin : begin + pressed.size]
             begin += pressed.size
         if self._control is not None:
@@ -263,30 +272,3 @@ def head_of(
 ) -> native.Head:
     """A compiled head of one of these models."""
     return native.Head(native.HeadParts(arrays, 0, linear, sprung, None, None, None))
-
-
-def _half_cosine(time: Any, raise_time: float) -> Any:
-    """From 0 to 1 over ``raise_time``, at one time or at several [s]."""
-    return 0.5 * (1.0 - np.cos(np.pi * time / raise_time))
-
-
-@dataclass(frozen=True)
-class Raising:
-    """Part of the lift that acts at a time [s]: a half cosine from 0 to 1 over ``raise_time``."""
-
-    raise_time: float
-
-    def __call__(self, time: float) -> float:
-        """The part at ``time`` [s]."""
-        if time >= self.raise_time:
-            return 1.0
-        return float(_half_cosine(time, self.raise_time))
-
-
-def parts_of(part: Callable[[float], float], times: np.ndarray) -> np.ndarray:
-    """The parts of the lift at ``times`` (n,) [s], which grow, shape (n,)."""
-    if not isinstance(part, Raising):
-        return np.array([part(time) for time in times.tolist()])
-    parts, n = np.ones(times.size), int(np.searchsorted(times, part.raise_time))
-    parts[:n] = _half_cosine(times[:n], part.raise_time)
-    return parts

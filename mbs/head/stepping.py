@@ -2,10 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from catenary.mbs.head.wire_crossing import CrossingPath
 from catenary.mbs.vehicle.base_motion import BaseMotion
+
+# Part of the lift that acts at times [s], shape as these.
+Part = Callable[[float | np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Raising:
+    """Part of the lift that acts: a half cosine from 0 to 1 over ``raise_time`` [s]."""
+
+    raise_time: float
+
+    def __call__(self, times: float | np.ndarray) -> np.ndarray:
+        """The parts at ``times`` [s], shape as these."""
+        if self.raise_time <= 0.0:
+            return np.ones(np.shape(times))
+        early = np.minimum(times, self.raise_time)
+        return np.asarray(0.5 * (1.0 - np.cos(np.pi * early / self.raise_time)))
 
 
 class Stepping(NamedTuple):

@@ -7,24 +7,22 @@ base's axes all bodies weigh more by its acceleration, which is exact for a base
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import ON_FRAME, ON_HEAD, SQUARE, AirForces
-from catenary.mbs.head.newmark_head import Raising
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import Part, Raising, Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
-from catenary.mbs.rigid.arrays import ORIGIN
 from catenary.mbs.rigid.bodies import SPACE, Motion
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
-from catenary.mbs.rigid.kinematics import body_products, point
+from catenary.mbs.rigid.kinematics import body_products
 from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
 from catenary.mbs.rigid.step_solvers import StepSolver
@@ -37,24 +35,6 @@ ARM, HEAD = "arm held at its place", "head moved from its place"
 PLACED = 1e-10
 
 
-@dataclass
-class _HoldDown:
-    """Hold-down of the arm until the pantograph is raised: ``force`` [N] less and less.
-
-    ``part(time)`` of the lift is let act; where it is negative, the arm is pulled down.
-    """
-
-    name: str
-    arm: str
-    part: Callable[[float], float]
-    force: float = 0.0
-
-    def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
-        left = self.force * (1.0 - self.part(time))
-        return -left * point(motion, self.arm, ORIGIN).jacobian[2]
-
-
 @dataclass(frozen=True)
 class _Carried:
     """Inertia forces on bodies over a base that is accelerated up and sideways."""
@@ -64,37 +44,25 @@ class _Carried:
     base: BaseMotion
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
         forces = np.zeros((len(self.masses), 6))
         forces[:, 1] = self.base.lateral(time).acceleration
         forces[:, 2] = self.base.vertical(time).acceleration
         return -(np.array(self.masses)[:, None] * forces).ravel()
 
 
-@dataclass(frozen=True)
-class _Blown:
-    """A ``force`` of the air as it acts at a time: times ``column`` of the numbers of ``air``."""
-
-    name: str
-    force: PointForce
-    air: AirForces
-    column: int
-
-    def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
-        return float(self.air.now(time)[self.column]) * self.force.generalised(motion, time)
-
-
-def _blown(data: MultibodyData, air: AirForces | None) -> tuple[_Blown, ...]:
-    """All forces of the air on bodies."""
+def _blown(data: MultibodyData, air: AirForces | None) -> tuple[PointForce, ...]:
+    """All forces of the air on bodies, as they act at a time."""
     if air is None:
         return ()
-    forces = [_Blown(force.name, force, air, SQUARE) for force in data.wind]
+
+    def at_times(force: PointForce, column: int) -> PointForce:
+        whole = np.asarray(force.force, dtype=float)
+        return replace(force, force=lambda time: air.now(time)[column] * whole)
+
+    forces = [at_times(force, SQUARE) for force in data.wind]
     if data.uplift is not None:
         for body, column in ((data.head, ON_HEAD), (data.arm, ON_FRAME)):
-            name = f"uplift of {body}"
-            lift = PointForce(name, body, (0.0, 0.0, 1.0))
-            forces.append(_Blown(name, lift, air, column))
+            forces.append(at_times(PointForce(f"uplift of {body}", body, (0.0, 0.0, 1.0)), column))
     return tuple(forces)
 
 
@@ -137,11 +105,14 @@ class FullPantograph:
         standing = stand(data)
         raise_time, dt, beta, gamma, self._lateral, base = stepping
         self._data, self._dt, self._base = data, dt, base
-        part = Raising(raise_time)
-        self._hold_down = _HoldDown("held down until raised", data.arm, part)
+        # Part of the lift that acts, and what holds the arm down without any of it [N].
+        self._part: Part = Raising(raise_time)
+        self._held = 0.0
         still = without_spins(standing.system, standing.motion)
         self._still = still.with_forces(*_blown(data, air))
-        system = self._still.with_forces(self._hold_down)
+        system = self._still.with_forces(
+            PointForce("held down until raised", data.arm, self._holding)
+        )
         if base is not None:
             masses = tuple(body.mass for body in system.bodies)
             system = system.with_forces(_Carried("carried by the base", masses, base))
@@ -166,7 +137,6 @@ class FullPantograph:
 
     @property
     def strip_offsets(self) -> tuple[float, ...]:
-        """Places of the strips ahead of the pantograph's own place [m]."""
         return self._data.strips.contact_offsets
 
     @property
@@ -179,9 +149,13 @@ class FullPantograph:
         """Positions of all bodies, from the base."""
         return self._stepper.motion
 
-    def follow(self, part: Callable[[float], float]) -> None:
-        """Scale the lift by ``part(time)``."""
-        self._hold_down.part = part
+    def follow(self, part: Part) -> None:
+        """Scale the lift by ``part``; where it is negative, the arm is pulled down."""
+        self._part = part
+
+    def _holding(self, time: float) -> tuple[float, float, float]:
+        """What holds the arm down until the pantograph is raised [N]."""
+        return 0.0, 0.0, -self._held * (1.0 - float(self._part(time)))
 
     def constraint_violation(self) -> float:
         """Largest error of a row of the joints now [m, cosine]."""
@@ -218,7 +192,7 @@ class FullPantograph:
                 break
         else:
             raise self._beyond_reach(head_height)
-        self._hold_down.force = held_force(self._still, holder, motion)
+        self._held = held_force(self._still, holder, motion)
         if velocity:
             raising = self._still.with_joints(
                 PrescribedPoint(ARM, data.arm, steady(arm, velocity)),
@@ -241,7 +215,6 @@ class FullPantograph:
         return self._early[0], self._early[1]
 
     def predict(self, time: float) -> HeadState:
-        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step."""
         self._aim(time)
         # The loop's clock counts: a restart begins at any time.
         self._stepper.time = time - self._dt
@@ -271,17 +244,16 @@ class FullPantograph:
     def state(self) -> np.ndarray:
         """Places, velocities, accelerations, contact forces, and what holds it down."""
         stepper = self._stepper
-        more = [stepper.acceleration, stepper.forces, [self._hold_down.force]]
+        more = [stepper.acceleration, stepper.forces, [self._held]]
         return np.concatenate([stepper.motion.to_vector(), *more])
 
     def restore(self, state: np.ndarray) -> None:
-        """Continue from what ``state`` returned."""
         stepper, n = self._stepper, self.motion.n_bodies
         values = np.array(state, dtype=float)
         stepper.motion = stepper.motion.restored(values[: 13 * n])
         stepper.acceleration = values[13 * n : 19 * n]
         stepper.forces = values[19 * n : -1]
-        self._hold_down.force = float(values[-1])
+        self._held = float(values[-1])
 
     def places(self) -> np.ndarray:
         """Positions (n, 3) [m] and Euler parameters (n, 4) of the bodies, one after the other."""

@@ -18,7 +18,7 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning
-from catenary.mbs.mechanism.reduction import Places, ReducedMechanism, reduce_mechanism
+from catenary.mbs.mechanism.reduction import Raised, ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper, gradient_of
@@ -28,7 +28,6 @@ from catenary.mbs.rigid.statics import (
     Calibration,
     calibrate_actuator,
     equilibrium,
-    held_force,
     unheld_force,
 )
 from catenary.mbs.rigid.system import Miss, System
@@ -171,13 +170,13 @@ def stand(data: MultibodyData) -> Standing:
         system, motion = system.with_force_changed(data.actuator, force=push), found.motion
         mechanism.calibration = found
     else:
-        force = before = held_force(system, holder, mechanism.motion)
+        motion, multipliers = equilibrium(held, mechanism.motion)
+        force = before = float(multipliers[-1])
         if force <= 0.0:
             raise InputError(
                 f"its static force is {force:.4g} N at its working height of {height:g} m: its "
                 "actuators cannot raise it"
             )
-        motion = equilibrium(held, mechanism.motion).motion
     if mechanism.head is None or not _is_at(motion, mechanism.head[0]):
         head = _head(data, system, holder, motion)
         mechanism.head = motion, head, system.n_degrees_of_freedom(motion)
@@ -200,7 +199,7 @@ class _Mechanism:
     held: System
     height: float
     motion: Motion
-    places: Places
+    places: Raised | None = None
     calibration: Calibration | None = None
     head: tuple[Motion, Head, int] | None = None
 
@@ -231,7 +230,7 @@ def _mechanism(data: MultibodyData) -> _Mechanism:
         raise InputError(
             f"its arm {data.arm!r} does not reach its working height of {height:g} m: {error}"
         ) from error
-    return _Mechanism(missed, system, held, height, motion, Places(data.actuator))
+    return _Mechanism(missed, system, held, height, motion)
 
 
 def _carried_along(data: MultibodyData, before: Motion, after: Motion) -> Motion:
@@ -249,15 +248,8 @@ def _carried_along(data: MultibodyData, before: Motion, after: Motion) -> Motion
 
 def _bodies_of(data: MultibodyData) -> MultibodyData:
     """Data of the mechanism alone at standstill: no static force, no air."""
-    return MultibodyData(
-        data.name,
-        data.system,
-        data.head,
-        data.arm,
-        data.working_height,
-        data.actuator,
-        assembly_tolerance=data.assembly_tolerance,
-    )
+    kept = data.name, data.system, data.head, data.arm, data.working_height, data.actuator
+    return MultibodyData(*kept, assembly_tolerance=data.assembly_tolerance)
 
 
 def _is_at(motion: Motion, other: Motion) -> bool:
@@ -275,7 +267,12 @@ def reduced(data: MultibodyData) -> ReducedMechanism:
     standing = stand(data)
     frame = without_head(data, standing.system)
     heights = standing.working_height + np.arange(-REACH, REACH + 0.5 * SPACING, SPACING)
-    start = _part(standing.motion, frame)
+    start, places = _part(standing.motion, frame), None
+    if standing.actuator_force is not None:
+        mechanism = _mechanism(_bodies_of(data))
+        if mechanism.places is None:
+            mechanism.places = Raised(frame, data.arm, actuator=data.actuator)
+        places = mechanism.places
     return reduce_mechanism(
         frame,
         data.arm,
@@ -285,7 +282,7 @@ def reduced(data: MultibodyData) -> ReducedMechanism:
         tolerance=LIFT_TOLERANCE,
         name=data.name,
         blowing=_on_frame(data, standing.motion),
-        places=None if standing.actuator_force is None else _mechanism(_bodies_of(data)).places,
+        places=places,
         riding=(standing.head.mass, _on_arm(data, standing.motion, np.zeros(3))),
     )
 

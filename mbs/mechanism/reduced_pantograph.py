@@ -19,10 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.mbs.air import SQUARE, AirForces
-from catenary.mbs.head.head_arrays import named
-from catenary.mbs.head.laws import Law, in_place
-from catenary.mbs.head.newmark_head import SteppedHead, parts_of
+from catenary.mbs.air import AirForces
+from catenary.mbs.head.laws import Law
+from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import ONE_STRIP, Strips, head_parts
 from catenary.mbs.mechanism.multibody_pantograph import Head
@@ -67,11 +66,11 @@ class RaisingPantograph(SteppedHead):
     def __init__(self, data: RaisingData, stepping: Stepping, air: AirForces | None = None) -> None:
         roll = data.head.roll if stepping.lateral is not None else None
         head = head_parts(*data.head[:3], data.strips, roll)
-        super().__init__(head, head.n + 1, stepping)
-        self._data = data
+        super().__init__(head, head.n + 1, stepping, air is None or air.is_steady)
         self._air = air
+        self._data = data
         head_number = int(np.flatnonzero(head.level)[-1])
-        self._put_laws(in_place(data.laws, (head_number, head.n), self._n, data.rest))
+        self._put_laws(data.laws, (head_number, head.n), data.rest)
         self._masses = np.append(head.masses, 0.0)
         self._stiffness, self._damping = head.stiffness, head.damping
         self._carrier = head.n
@@ -83,36 +82,17 @@ class RaisingPantograph(SteppedHead):
         # NaN is none: the coupling refuses it.
         raise self._data.frame.left(left.height, time)
 
-    def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
-        """Fill in lift and base, and where the wire crosses; see `SteppedHead`."""
-        rows = named(drives)
-        rows["part"] = parts_of(self._part, times)
+    def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
+        rows["part"] = self._part(times)
         if self._base is not None:
-            motions = np.array([self._base.vertical(time) for time in times.tolist()])
-            rows["base"], rows["base_velocity"], rows["base_acceleration"] = motions.T
-            rows["roof"], rows["roof_velocity"] = rows["base"], rows["base_velocity"]
+            place, velocity, acceleration = self._base.lifts(times)
+            rows["base"] = rows["roof"] = place
+            rows["base_velocity"] = rows["roof_velocity"] = velocity
+            rows["base_acceleration"] = acceleration
         if self._air is not None:
-            blown = self._blowing(self._air.at(times))
-            rows["head_air"], rows["arm_air"], rows["bodies_air"] = blown.T
-        self._fill_lateral(times, drives)
+            rows["head_air"], rows["arm_air"], rows["bodies_air"] = self._air.at(times).T
+            rows["head_air"] += self._data.blown_head * rows["bodies_air"]
 
     def base(self, time: float) -> float:
         """Height of the base at ``time`` [s], in the line's heights [m]."""
         return self._data.base_height + lifted(self._base, time)[0]
-
-    def _put_drive(self, time: float) -> None:
-        now = self._now
-        now["part"] = self._part(time)
-        if self._base is not None:
-            moved = self._base.vertical(time)
-            now["base"], now["base_velocity"], now["base_acceleration"] = moved
-            now["roof"], now["roof_velocity"] = moved.place, moved.velocity
-        if self._air is not None:
-            blown = self._blowing(self._air.now(time))
-            now["head_air"], now["arm_air"], now["bodies_air"] = blown
-
-    def _blowing(self, forces: np.ndarray) -> np.ndarray:
-        """Forces on head, arm and bodies, from those of ``AirForces``, shape as these."""
-        blown = forces.copy()
-        blown[..., 0] += self._data.blown_head * forces[..., SQUARE]
-        return blown

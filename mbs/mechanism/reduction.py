@@ -94,7 +94,7 @@ def reduce_mechanism(
     tolerance: float | None = None,
     name: str = "",
     blowing: Sequence[PointForce] = (),
-    places: Places | None = None,
+    places: Raised | None = None,
     riding: tuple[float, Vector] = (0.0, ORIGIN),
 ) -> ReducedMechanism:
     """Tables of a mechanism for heights of the point ``at`` of a body.
@@ -124,7 +124,7 @@ def reduce_mechanism(
         Name of the pantograph, for messages.
     blowing : sequence of PointForce, optional
         Forces of the air, of which the tables have a column of their own.
-    places : Places, optional
+    places : Raised, optional
         Places that earlier calls have found for the same ``body`` and ``at`` and a system
         that differs in the force of an actuator alone.
     riding : tuple, optional
@@ -140,7 +140,8 @@ def reduce_mechanism(
     if len(table) < 4 or np.any(np.diff(table) <= 0.0):
         raise InputError(f"A mechanism is reduced for at least four growing heights, not {table}.")
     # Heights are visited from the one that is nearest to the start, each from its neighbour.
-    raised, more = (places or Places(None)).of(system, body, at)
+    raised = places or Raised(system, body, at)
+    more = raised.more(system)
     motion = raised.assembled(start)
     first = int(np.argmin(np.abs(table - point(motion, body, at).value[2])))
     found = [raised.to(table[first], motion)]
@@ -182,30 +183,6 @@ def reduce_mechanism(
     return ReducedMechanism(reached, masses, lifts, dampings, carried, name, blown)
 
 
-class Places:
-    """Places of a mechanism at rest that were found so far, for any constant force of an actuator.
-
-    Parameters
-    ----------
-    actuator : its name, None if all forces stay as they are
-    """
-
-    def __init__(self, actuator: str | None) -> None:
-        self._actuator = actuator
-        self._raised: _Raised | None = None
-
-    def of(self, system: System, body: str, at: Vector) -> tuple[_Raised, float]:
-        """The mechanism with the places found before, and the additional push of its actuator [N].
-
-        Its point is ``at`` in the axes of ``body`` [m].
-        """
-        actuator = None if self._actuator is None else system.force(self._actuator)
-        assert actuator is None or isinstance(actuator, Actuator)
-        if self._raised is None:
-            self._raised = _Raised(system, body, at, actuator)
-        return self._raised, 0.0 if actuator is None else actuator.force - self._raised.push
-
-
 class _Place(NamedTuple):
     """A mechanism at rest at a ``height``: ``columns`` (3,) of its tables there but for the lift
     [N], and its ``way`` (6 n,), the displacement per metre of height."""
@@ -217,21 +194,25 @@ class _Place(NamedTuple):
     way: np.ndarray
 
 
-class _Raised:
-    """A system with the point ``at`` of a body held at heights that follow one another.
+class Raised:
+    """A mechanism at rest with the point ``at`` of a body held at heights, found so far for any
+    constant force of an ``actuator``; without one all forces stay as they are."""
 
-    Attributes
-    ----------
-    push : force of ``actuator`` in the system [N]
-    """
-
-    def __init__(self, system: System, body: str, at: Vector, actuator: Actuator | None) -> None:
+    def __init__(
+        self, system: System, body: str, at: Vector = ORIGIN, actuator: str | None = None
+    ) -> None:
         self._system, self._height = system, 0.0
+        self._actuator = None if actuator is None else _actuator(system, actuator)
         # Its law reads the height of the moment, so that the system is made once.
         self._held = system.with_joints(PrescribedPoint("height", body, self._law, at))
         self._places: dict[float, _Place] = {}
         self._gains: dict[float, float] = {}
-        self._actuator, self.push = actuator, 0.0 if actuator is None else actuator.force
+
+    def more(self, system: System) -> float:
+        """By how much more the actuator pushes in a ``system`` than in this one [N]."""
+        if self._actuator is None:
+            return 0.0
+        return _actuator(system, self._actuator.name).force - self._actuator.force
 
     def assembled(self, start: Motion | None) -> Motion:
         """A motion that joints allow, near by, or near the data's if None."""
@@ -291,7 +272,13 @@ class _Raised:
         return _Place(height, motion, columns, float(lift), way)
 
 
-def _refined(raised: _Raised, more: float, places: list[_Place], tolerance: float) -> list[_Place]:
+def _actuator(system: System, name: str) -> Actuator:
+    found = system.force(name)
+    assert isinstance(found, Actuator)
+    return found
+
+
+def _refined(raised: Raised, more: float, places: list[_Place], tolerance: float) -> list[_Place]:
     """Add places at heights in between where splines miss the lift, such as at stops.
 
     Splines through every second place are compared at the others, which costs no further place; one
@@ -308,7 +295,7 @@ def _refined(raised: _Raised, more: float, places: list[_Place], tolerance: floa
 
 
 def _missed(
-    raised: _Raised, more: float, places: list[_Place], others: list[_Place], tolerance: float
+    raised: Raised, more: float, places: list[_Place], others: list[_Place], tolerance: float
 ) -> list[_Place]:
     """Places of ``others`` whose lift differs by over ``tolerance`` from a spline of ``places``."""
     lift = CubicSpline([p.height for p in places], [raised.lift(p, more) for p in places])

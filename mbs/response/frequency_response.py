@@ -47,7 +47,8 @@ class Peak(NamedTuple):
 
 
 def head_response(data: LumpedData | MultibodyData, static_force: float) -> HeadResponse:
-    """A pantograph linearised where it presses with ``static_force`` [N]. Not collective.
+    """A pantograph without its laws linearised where it presses with ``static_force`` [N]. Not
+    collective.
 
     Raises
     ------

@@ -161,7 +161,6 @@ class PointForce:
     at: Vector = ORIGIN
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
         force = self.force(time) if callable(self.force) else self.force
         return np.asarray(force, dtype=float) @ point(motion, self.body, self.at).jacobian
 
@@ -184,7 +183,6 @@ class Gravity:
         object.__setattr__(self, "_forces", forces.ravel())
 
     def generalised(self, motion: Motion, time: float) -> np.ndarray:
-        """Generalised forces (6 n,)."""
         return self._forces.copy()
 
 

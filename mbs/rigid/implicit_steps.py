@@ -28,10 +28,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.base.errors import InputError, NotConverged, RunBroken
+from catenary.base.errors import NotConverged, RunBroken
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.kinematics import Quantity
-from catenary.mbs.rigid.step_solvers import StepSolver, step_solver
+from catenary.mbs.rigid.step_solvers import METHODS, StepSolver
 from catenary.mbs.rigid.system import System
 
 # Generalised forces (6 n, s) of unit forces at a motion.
@@ -48,7 +48,7 @@ class Prediction(NamedTuple):
     ``motion``: prediction of the last substep; ``displacement``, ``velocity``, ``acceleration``
     (6 n,): what is to be added to its place, its velocities and the accelerations before that
     substep when f are the ``forces`` (s,) last taken; ``by_force``: the same per unit of force,
-    shapes (6 n, s). ``ways`` (6 n, s) of unit forces there.
+    shapes (6 n, s).
     """
 
     motion: Motion
@@ -57,7 +57,6 @@ class Prediction(NamedTuple):
     acceleration: np.ndarray
     by_force: tuple[np.ndarray, np.ndarray, np.ndarray]
     forces: np.ndarray
-    ways: np.ndarray
 
     def changes(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement, change of velocity and of acceleration (6 n,) with these forces (s,)."""
@@ -67,15 +66,6 @@ class Prediction(NamedTuple):
             self.velocity + self.by_force[1] @ more,
             self.acceleration + self.by_force[2] @ more,
         )
-
-
-class _Solved(NamedTuple):
-    """A substep solved: prediction, change d (6 n,) and what a unit force does to q, v and a."""
-
-    motion: Motion
-    change: np.ndarray
-    by_force: tuple[np.ndarray, np.ndarray, np.ndarray]
-    ways: np.ndarray
 
 
 class Stepper:
@@ -89,11 +79,6 @@ class Stepper:
     ways : generalised forces of unit forces that are given step by step; none if left out
     substeps : into how many a step is cut
     beta, gamma : Newmark's parameters
-
-    Raises
-    ------
-    InputError
-        A step that is not positive, or no substep.
     """
 
     def __init__(
@@ -106,12 +91,8 @@ class Stepper:
         beta: float = 0.25,
         gamma: float = 0.5,
     ) -> None:
-        if dt <= 0.0 or substeps < 1:
-            raise InputError(
-                f"A step of {dt:g} s in {substeps} substeps is none: both must be positive."
-            )
         self.system = system
-        self._solver = step_solver(solver) if isinstance(solver, str) else solver
+        self._solver = METHODS[solver]() if isinstance(solver, str) else solver
         self._ways = ways or (lambda motion: np.zeros((6 * motion.n_bodies, 0)))
         self._dt, self._substeps = dt, substeps
         self._beta, self._gamma = beta, gamma
@@ -129,34 +110,17 @@ class Stepper:
 
     def predict(self, time: float) -> Prediction:
         """The end of the coming step, at ``time`` [s], as a function of the forces in it."""
-        h, forces = (time - self.time) / self._substeps, self.forces
-        motion, acceleration = self.motion, self.acceleration
-        none = np.zeros((len(acceleration), len(forces)))
-        by_force = none, none, none
+        h = (time - self.time) / self._substeps
+        none = np.zeros((self.acceleration.size, self.forces.size))
+        motion, acceleration, by_force = self.motion, self.acceleration, (none, none, none)
         for number in range(1, self._substeps + 1):
             end = self.time + number * h
-            share = number / self._substeps
-            solved = self._solve(motion, acceleration, by_force, share, end, h)
-            by_force = solved.by_force
+            found = self._solve(motion, acceleration, by_force, number / self._substeps, end, h)
+            acceleration, by_force = found.acceleration, found.by_force
             if number < self._substeps:
-                motion = self._finished(
-                    solved.motion,
-                    self._beta * h**2 * solved.change,
-                    self._gamma * h * solved.change,
-                    end,
-                )
-                acceleration = acceleration + solved.change
-        self._end = end
-        self._predicted = Prediction(
-            solved.motion,
-            self._beta * h**2 * solved.change,
-            self._gamma * h * solved.change,
-            acceleration + solved.change,
-            by_force,
-            forces,
-            solved.ways,
-        )
-        return self._predicted
+                motion = self._finished(found.motion, found.displacement, found.velocity, end)
+        self._end, self._predicted = end, found
+        return found
 
     def advance(self, forces: np.ndarray | None = None) -> None:
         """Take the step predicted last with forces (s,) [N].
@@ -192,11 +156,8 @@ class Stepper:
         share: float,
         end: float,
         h: float,
-    ) -> _Solved:
-        """A substep: its prediction and what it changes with the forces last taken.
-
-        ``share`` of a change of forces has happened at its end.
-        """
+    ) -> Prediction:
+        """The end of a substep; ``share`` of a change of forces has happened there."""
         system, beta, gamma = self.system, self._beta, self._gamma
         velocities = motion.velocities
         there = motion.moved(h * velocities + 0.5 * h**2 * acceleration).with_velocities(
@@ -223,11 +184,13 @@ class Stepper:
             np.column_stack([closing, -part * (rows.jacobian @ pushed)]),
         )
         change, by = solution[:, 0], solution[:, 1:]
-        return _Solved(
+        return Prediction(
             there,
-            change,
+            beta * h**2 * change,
+            gamma * h * change,
+            acceleration + change,
             (moved + beta * h**2 * by, sped + gamma * h * by, pushed + by),
-            ways,
+            self.forces,
         )
 
     def _closing(

@@ -24,11 +24,7 @@ from catenary.mbs.rigid.bodies import SPACE, Vector, rotation_matrix
 from catenary.mbs.rigid.kinematics import (
     Law,
     Quantity,
-    applied_to,
-    cross,
-    difference,
     part_of,
-    stacked,
 )
 
 AXES = np.eye(3)
@@ -113,7 +109,6 @@ class Spherical(_BetweenPoints):
     n_lengths: ClassVar[int] = 3
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         return same_point(self.i, self.at_i, self.j, self.at_j)
 
 
@@ -126,7 +121,6 @@ class Revolute(_BetweenPoints):
     n_lengths: ClassVar[int] = 3
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         return [
             *same_point(self.i, self.at_i, self.j, self.at_j),
             *across_axis(self.i, across(self.axis_i), self.j, unit(self.axis_j)),
@@ -141,7 +135,6 @@ class PointOnLine(_BetweenPoints):
     n_lengths: ClassVar[int] = 2
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         return across_gap(self.i, across(self.axis_i), self.j, self.at_j, self.i, self.at_i)
 
 
@@ -159,9 +152,8 @@ class Prismatic(_BetweenPoints):
     n_lengths: ClassVar[int] = 2
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         normals = across(self.axis_i)
-        side = cross(unit(self.axis_i), unit(self.normal_i))
+        side = np.cross(unit(self.axis_i), unit(self.normal_i))
         return [
             *across_gap(self.i, normals, self.j, self.at_j, self.i, self.at_i),
             *across_axis(self.i, normals, self.j, unit(self.axis_j)),
@@ -183,7 +175,6 @@ class RevolutePrismatic(_BetweenPoints):
     n_lengths: ClassVar[int] = 2
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         slide, turn = across(self.slide_axis_j), across(self.turn_axis_j)
         return [
             *across_gap(self.j, slide, self.i, self.at_i, self.j, self.at_j),
@@ -207,7 +198,6 @@ class Fixed:
     n_lengths: ClassVar[int] = 3
 
     def products(self) -> list[Product]:
-        """Scalar products of its rows."""
         axes_i = rotation_matrix(np.asarray(self.parameters)).T
         return [
             *same_point(self.j, self.at_j, self.i, self.at_i),
@@ -244,13 +234,16 @@ class PointOnCurve(MadeRows):
         return same_point(self.body, self.at, SPACE, ORIGIN)
 
     def rows(self, products: Quantity, time: float) -> Quantity:
-        """Phi with its derivatives."""
-        x, y, z = (part_of(products, slice(k, k + 1)) for k in range(3))
-        curves = []
-        for coordinate, spline in zip((y, z), self._splines, strict=True):
-            law = Law(*(float(spline(x.value[0], k)) for k in range(3)))
-            curves.append(difference(coordinate, applied_to(x, law)))
-        return stacked(curves)
+        x, across = part_of(products, slice(0, 1)), part_of(products, slice(1, 3))
+        curve, slope, bend = (
+            np.array([spline(x.value[0], k) for spline in self._splines]) for k in range(3)
+        )
+        return Quantity(
+            across.value - curve,
+            across.jacobian - slope[:, None] * x.jacobian,
+            across.rate - slope * x.rate,
+            across.drift - (slope * x.drift + bend * x.rate**2),
+        )
 
 
 @dataclass(frozen=True)
@@ -268,7 +261,6 @@ class PrescribedPoint:
     n_lengths: ClassVar[int] = 1
 
     def products(self) -> list[Product]:
-        """The scalar product of its row."""
         return [Product(SPACE, unit(self.along), self.body, self.at, SPACE, ORIGIN, self.law)]
 
 
@@ -292,6 +284,6 @@ class PrescribedAngle:
     def products(self) -> list[Product]:
         """The turned normal across ``normal_i``."""
         forward = unit(self.normal_i)
-        side = cross(unit(self.axis_i), forward)
+        side = np.cross(unit(self.axis_i), forward)
         normal = np.cos(self.angle) * side - np.sin(self.angle) * forward
         return across_axis(self.i, [normal], self.j, unit(self.normal_j))

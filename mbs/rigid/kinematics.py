@@ -36,12 +36,6 @@ class Law(NamedTuple):
     second: float
 
 
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a x b of two vectors (3,): what numpy's does, in a tenth of its time."""
-    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
-    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
-
-
 def number_of(motion: Motion, body: str) -> int:
     """Number of a body; raises InputError for a name that there is not."""
     if body not in motion.numbers:
@@ -65,21 +59,6 @@ def point(motion: Motion, body: str, local: Vector) -> Quantity:
     rows["end"], rows["at_end"] = number_of(motion, body), local
     rows["normal"], rows["between"] = np.eye(3), True
     return body_products(motion, rows)
-
-
-def difference(a: Quantity, b: Quantity) -> Quantity:
-    """a - b."""
-    return Quantity(*(x - y for x, y in zip(a, b, strict=True)))
-
-
-def applied_to(a: Quantity, f: Law) -> Quantity:
-    """f(a) of one number a, given f and its derivatives there."""
-    return Quantity(
-        np.array([f.value]),
-        f.first * a.jacobian,
-        f.first * a.rate,
-        f.first * a.drift + f.second * a.rate**2,
-    )
 
 
 def stacked(parts: list[Quantity]) -> Quantity:

@@ -118,13 +118,7 @@ def held_force(system: System, holder: Joint, start: Motion) -> float:
     ``holder``, for instance a `PrescribedPoint`, is added to the joints; the force is positive in
     the direction in which the held coordinate grows.
     """
-    return _pressed(system.with_joints(holder), start)[0]
-
-
-def _pressed(held: System, start: Motion) -> tuple[float, Motion]:
-    """The force of ``held_force`` on the last joint, and the place at rest."""
-    rest = equilibrium(held, start)
-    return float(rest.multipliers[-1]), rest.motion
+    return float(equilibrium(system.with_joints(holder), start).multipliers[-1])
 
 
 class Calibration(NamedTuple):
@@ -174,7 +168,8 @@ def calibrate_actuator(
         raise InputError(f"Force {actuator!r} is no actuator.")
 
     def pressed(push: float, start: Motion) -> tuple[float, Motion]:
-        return _pressed(held.with_force_changed(actuator, force=push), start)
+        rest = equilibrium(held.with_force_changed(actuator, force=push), start)
+        return float(rest.multipliers[-1]), rest.motion
 
     if near is None:
         push = before.force

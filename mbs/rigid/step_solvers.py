@@ -21,12 +21,13 @@ J. Baumgarte, Comp. Meth. Appl. Mech. Eng. 1, 1972.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from scipy import linalg
 
-from catenary.base.errors import InputError, NotConverged
+from catenary.base.errors import NotConverged
 from catenary.mbs.rigid.system import independent_rows
 
 # A pivot of dependent coordinates below this part of the largest one: others are chosen.
@@ -210,17 +211,8 @@ class WithFeedback(_Multipliers):
         return np.zeros(self._rows.shape[1])
 
 
-METHODS = {
+METHODS: dict[str, Callable[[], StepSolver]] = {
     "coordinate_partitioning": Partitioned,
     "augmented_lagrangian": Augmented,
     "baumgarte": WithFeedback,
 }
-
-
-def step_solver(method: str) -> StepSolver:
-    """The method of this name with its usual constants; raises InputError for an unknown name."""
-    if method not in METHODS:
-        raise InputError(
-            f"There is no way of keeping constraints {method!r}; there are {', '.join(METHODS)}."
-        )
-    return METHODS[method]()

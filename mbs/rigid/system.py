@@ -29,6 +29,8 @@ from catenary.solver.kernels import native
 
 # A row of Phi_q that the rows before it explain but for this part of its length is redundant.
 DEPENDENT = 1e-8
+# Error of a row of a joint that is closed [m, cosine], within 1 m of the origin.
+_CLOSED = 1e-12
 # Of Newton's method that closes joints.
 _MOST_ITERATIONS = 30
 
@@ -203,12 +205,7 @@ class System:
             result.append(Miss(joint.name, float(np.linalg.norm(gap)), float(np.linalg.norm(tilt))))
         return tuple(result)
 
-    def assemble(
-        self,
-        motion: Motion,
-        time: float = 0.0,
-        tolerance: float = 1e-12,
-    ) -> Motion:
+    def assemble(self, motion: Motion, time: float = 0.0) -> Motion:
         """Close all joints by the smallest displacements (position projection).
 
         Newton's method; redundant rows do no harm. Velocities stay as they are.
@@ -219,10 +216,6 @@ class System:
             Places to start from, and velocities that are kept.
         time : float, optional
             Time of prescribed motions [s].
-        tolerance : float, optional
-            Largest error of a row afterwards [m, cosine], relative to the largest
-            distance of a body from the origin where that is above 1 m (what round-off
-            allows).
 
         Raises
         ------
@@ -231,7 +224,8 @@ class System:
         """
         if not self.joints:
             return motion
-        limit = tolerance * max(1.0, float(np.abs(motion.position).max()))
+        # What round-off allows, which grows with the distance from the origin.
+        limit = _CLOSED * max(1.0, float(np.abs(motion.position).max()))
         for _ in range(_MOST_ITERATIONS + 1):
             rows = self.constraints(motion, time)
             if np.abs(rows.value).max() <= limit:

@@ -103,6 +103,10 @@ class BaseMotion:
         """Upward motion at ``time`` [s]."""
         return self._sum(self._vertical, time)
 
+    def lifts(self, times: np.ndarray) -> np.ndarray:
+        """Upward motions at ``times`` (n,) [s], (3, n)."""
+        return np.array([self.vertical(time) for time in times.tolist()]).T
+
     def lateral(self, time: float) -> Motion:
         """Motion to the left at ``time`` [s]."""
         return self._sum(self._lateral, time)
@@ -124,8 +128,7 @@ def lifted(base: BaseMotion | None, time: float) -> tuple[float, float]:
     """Lift [m] and upward velocity [m/s] of a base at ``time`` [s], both zero without one."""
     if base is None:
         return 0.0, 0.0
-    vertical = base.vertical(time)
-    return float(vertical.place), float(vertical.velocity)
+    return base.vertical(time)[:2]
 
 
 def _course(

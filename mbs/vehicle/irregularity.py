@@ -15,6 +15,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -78,11 +79,7 @@ class Irregularity:
 
     def waves(self, direction: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Amplitudes [m], wave numbers [rad/m] and phases [rad] of the sines, see ``sines``."""
-        spectrum = SPECTRA[self.spectrum]
-
-        def variance(lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-            return spectrum.variance(direction, lowest, highest)
-
+        variance = partial(SPECTRA[self.spectrum].variance, direction)
         return sines(variance, (self.shortest, self.longest), self.seed, direction)
 
 

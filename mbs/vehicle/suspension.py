@@ -112,14 +112,12 @@ def transfer(
         return np.ones(wave_numbers.shape, dtype=complex)
     half = 0.5 * vehicle.bogie_distance
     places = np.array([half, -half]) - vehicle.pantograph_ahead
-    response = np.empty(wave_numbers.shape, dtype=complex)
-    for number, k in enumerate(wave_numbers):
-        rate = 1j * k * speed
-        track = np.exp(1j * k * places) * math.cos(0.5 * k * vehicle.wheelbase)
-        dynamic = rate**2 * found.mass + rate * found.damping + found.stiffness
-        motion = np.linalg.solve(dynamic, (found.by_place + rate * found.by_rate) @ track)
-        response[number] = found.roof @ motion
-    return response
+    k = wave_numbers[..., None, None]
+    rate = 1j * k * speed
+    track = np.exp(1j * k * places[:, None]) * np.cos(0.5 * k * vehicle.wheelbase)
+    dynamic = rate**2 * found.mass + rate * found.damping + found.stiffness
+    motion = np.linalg.solve(dynamic, (found.by_place + rate * found.by_rate) @ track)
+    return np.asarray(motion[..., 0] @ found.roof)
 
 
 def roof_course(

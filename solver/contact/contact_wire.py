@@ -138,28 +138,23 @@ class ContactWires:
     def rest_height(self, x: np.ndarray) -> np.ndarray:
         """Height of the lowest wire at rest at positions ``x`` (n,) [m], (n,); infinite where there
         is none."""
-        return self._lowest(x)[0]
+        return np.fmin.reduce(self._rest_heights(x), initial=np.inf)
 
     def rest_height_of(self, wire: int, x: np.ndarray) -> np.ndarray:
         """Height of a wire at rest at positions ``x`` (n,) [m], (n,); NaN where it is not."""
         touches = self.touches(x, wire)
-        own = _height_of(touches)
-        return np.where(touches["present"] > 0.0, own, np.nan)
+        axis = (touches["whole_value"] * touches["rest"]).sum(axis=1)
+        return np.where(touches["present"] > 0.0, axis + touches["surface"][:, 0], np.nan)
 
     def rest_slope(self, x: np.ndarray) -> np.ndarray:
         """Slope dw/dx of the lowest wire at rest at positions ``x`` (n,) [m], (n,) [-]."""
-        return self._lowest(x)[1]
+        lowest = np.argmin(np.nan_to_num(self._rest_heights(x), nan=np.inf), axis=0)
+        touches = self.touches(x, lowest)
+        slope = (touches["whole_slope"] * touches["rest"]).sum(axis=1) + touches["surface"][:, 1]
+        return np.where(touches["present"] > 0.0, slope, 0.0)
 
-    def _lowest(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        height, slope = np.full(x.shape, np.inf), np.zeros(x.shape)
-        for wire in range(self.n_wires):
-            touches = self.touches(x, wire)
-            own = _height_of(touches)
-            lower = (touches["present"] > 0.0) & (own < height)
-            height[lower] = own[lower]
-            steep = (touches["whole_slope"] * touches["rest"]).sum(axis=1)
-            slope[lower] = (steep + touches["surface"][:, 1])[lower]
-        return height, slope
+    def _rest_heights(self, x: np.ndarray) -> list[np.ndarray]:
+        return [self.rest_height_of(wire, x) for wire in range(self.n_wires)]
 
     def nodes_between(self, low: float, high: float, wire: int = 0) -> tuple[int, int]:
         """Range of a wire's nodes whose elements cover [low, high] [m], ends included."""
@@ -169,9 +164,3 @@ class ContactWires:
         begin = int(np.searchsorted(own, low - SLIP, side="right")) - 1
         last = int(np.searchsorted(own, high + SLIP)) + 1
         return int(first) + max(begin, 0), int(first) + min(last, own.size)
-
-
-def _height_of(touches: np.ndarray) -> np.ndarray:
-    """Height of the wires at rest where they are touched, their running surface included [m]."""
-    axis = (touches["whole_value"] * touches["rest"]).sum(axis=1)
-    return np.asarray(axis + touches["surface"][:, 0])

@@ -21,14 +21,16 @@ from catenary.solver.model.partition import Ownership
 from catenary.solver.statics.form_finding.equilibrium import Equilibrium
 
 
-def sideways_of(
+def _sideways_of(
     model: Model, form: Equilibrium, wires: ContactWires, ownership: Ownership
 ) -> native.Sideways:
-    """Lateral data of a line with lateral motion, which is at rest in ``form``."""
+    """Lateral data of a line at rest in ``form``, empty if it has no lateral motion."""
+    if form.lateral is None:
+        nothing = np.zeros((0, 2))
+        return native.Sideways(nothing.astype(np.int64), nothing.astype(bool), nothing)
     dofs = np.stack([model.dofs(wires.mesh_nodes, name) for name in ("v", "theta_z")], axis=1)
     mine = ownership.owned(dofs)
     local = np.where(mine, dofs - ownership.first, 0).astype(np.int64)
-    assert form.lateral is not None
     rest = np.stack([form.lateral.y, form.lateral.slope], axis=1)[wires.mesh_nodes]
     return native.Sideways(local, mine, rest)
 
@@ -84,6 +86,10 @@ class ForcesOnLine:
     link_coupling : LinkCoupling, None if no link switches
     reach : how far from a force the line moves within a step [m]
     contacts : all that kernels work on
+    heights : ``heights(height, rate)`` fills in this rank's share of the wire's height [m] and of
+        what the pan head meets, dw/dt + V dw/dx [m/s], at each contact; shares add up over ranks
+    add_work : ``add_work(contact_force)`` adds the work of forces (n,) [N] in the step that the
+        line has just completed
 
     Parameters
     ----------
@@ -124,9 +130,6 @@ class ForcesOnLine:
         n, n_local = candidates.place.size, line.ownership.n_local
         self._across = across
         self._share_across = across if comm.size == 1 else np.zeros(across.shape)
-        sideways = _no_sideways()
-        if across.size:
-            sideways = sideways_of(model, form, wires, line.ownership)
         self.contacts = native.Contacts(
             x=candidates.place,
             touches=wires.on_wires(candidates.wire, candidates.half_length),
@@ -143,15 +146,15 @@ class ForcesOnLine:
             followed=self.links.followed,
             link_columns=columns.of_links,
             work=work,
-            sideways=sideways,
+            sideways=_sideways_of(model, form, wires, line.ownership),
             across=native.Across(*self._share_across),
         )
         self._place = native.place.bound(self.contacts)
-        self._heights = native.heights.bound(self.contacts)
+        self.heights = native.heights.bound(self.contacts)
         self._superpose = native.superpose.bound(self.contacts)
         self._compensate = native.compensate.bound(self.contacts)
         self._begin_work = native.begin_work.bound(self.contacts)
-        self._add_work = native.add_work.bound(self.contacts)
+        self.add_work = native.add_work.bound(self.contacts)
 
     def place(self) -> None:
         """Look where the contacts are now, and work out the line's answer to a unit force at
@@ -163,10 +166,6 @@ class ForcesOnLine:
         """Look where the contacts are now, for heights and loads only."""
         native.locate(self.contacts.x, self.contacts.wires, self.contacts.touches)
         self._begin_work()
-
-    def present(self) -> np.ndarray:
-        """Whether the wire of each contact is on its strip, (n,) bool, where they were located."""
-        return np.asarray(self.presence > 0.0)
 
     @property
     def presence(self) -> np.ndarray:
@@ -186,13 +185,6 @@ class ForcesOnLine:
             if self._comm.size > 1:
                 everything = self._across if self._comm.rank == 0 else None
                 self._comm.Reduce(self._share_across, everything, op=MPI.SUM, root=0)
-
-    def heights(self, height: np.ndarray, rate: np.ndarray) -> None:
-        """Fill in this rank's share of wire height [m] and its total rate [m/s] at each contact.
-
-        The total rate is what the pan head meets: dw/dt + V dw/dx. Shares add up over the ranks.
-        """
-        self._heights(height, rate)
 
     def responder(self, response: LineResponse) -> Callable[[], None]:
         """Function that fills in this rank's share of the inner problem.
@@ -222,11 +214,7 @@ class ForcesOnLine:
         self._superpose(contact_force)
         if links.size:
             self._compensate(links, compensation)
-        self._add_work(contact_force)
-
-    def add_work(self, contact_force: np.ndarray) -> None:
-        """Add the work of contact forces (n,) [N] in the step that the line has just completed."""
-        self._add_work(contact_force)
+        self.add_work(contact_force)
 
     def loads(
         self, contact_force: np.ndarray, compensation: np.ndarray

@@ -20,19 +20,9 @@ class Heads(HeadState):
         self.early_height = np.zeros(n)
         self.early_velocity = np.zeros(n)
 
-    @property
-    def n(self) -> int:
-        """Number of contacts."""
-        return int(self.height.size)
-
     def put(self, strips: slice, head: HeadState) -> None:
         """Copy the state of one pantograph's head to its ``strips``."""
         self.height[strips] = head.height
         self.velocity[strips] = head.velocity
         self.height_compliance[strips, strips] = head.height_compliance
         self.velocity_compliance[strips, strips] = head.velocity_compliance
-
-    def adopt(self, head: HeadState) -> None:
-        """Stand for the strips of the only pantograph there is: its arrays themselves."""
-        if head.numbers is not self.numbers:
-            self.take(head.numbers, self.n)

@@ -19,11 +19,11 @@ from catenary.mbs.build import (
     make_pantograph,
     steady_forces,
 )
-from catenary.mbs.called_model import CalledModel
+from catenary.mbs.called_model import called_by_kernels
 from catenary.mbs.head.head_arrays import N_DRIVE, named
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath, SeveralPaths
+from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.lumped_data import LumpedData
@@ -31,7 +31,7 @@ from catenary.mbs.vehicle.base_motion import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
 from catenary.solver.contact.head_states import Heads
 from catenary.solver.kernels import native
-from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw
+from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem
 from catenary.solver.problem.simulated import Simulated
 from catenary.solver.statics.elasticity import Elasticity
@@ -131,38 +131,38 @@ class Pantographs:
         self._wires = wires
         self._start = np.array([train.start - p.behind for p in train.placements])
         self.speed, self.nominal_height = train.speed, nominal_height
-        offsets = [placement.data.strips.offsets for placement in train.placements]
-        counts, n_wires = [len(own) for own in offsets], wires.n_wires
-        of_strip, of_pantograph = np.arange(sum(counts) + 1), np.cumsum([0, *counts])
-        self.ends = native.StripEnds(
-            n_wires * of_strip.astype(np.int64), of_pantograph.astype(np.int64)
-        )
+        n_wires = wires.n_wires
+        self._data = [_simulated(placement, simulated, n_wires) for placement in train.placements]
+        strips = [data.strips for data in self._data]
+        offsets = np.concatenate([own.offsets for own in strips])
+        counts = np.array([own.number for own in strips])
+        of_pantograph = np.cumsum([0, *counts])
+        self.ends = native.StripEnds(n_wires * np.arange(offsets.size + 1), of_pantograph)
         self._contacts = [
             slice(int(a), int(b)) for a, b in itertools.pairwise(n_wires * of_pantograph)
         ]
-        strip_start = np.repeat(self._start, counts) + np.concatenate(offsets)
-        half_length = [placement.data.strips.half_length for placement in train.placements]
+        strip_start = np.repeat(self._start, counts) + offsets
         # Places of contacts and of pantographs move together, in one sum.
         self.n_contacts = n_wires * strip_start.size
         all_start = np.concatenate([np.repeat(strip_start, n_wires), self._start])
         shares = self.n * n_wires if n_wires > 1 else 0
         sizes = (self.n, 3 * self.n, strip_start.size, shares, self.n)
-        endless = np.full(self.n_contacts, np.inf)
         places_and_outputs = np.zeros(self.n_contacts + sum(sizes))
         all_places = places_and_outputs[: all_start.size]
+        # A wire that is alone is never out of reach: beside the strips it runs on the horns.
+        half_length = [own.half_length if n_wires > 1 else np.inf for own in strips]
         self.candidates = Candidates(
             places_and_outputs[: self.n_contacts],
             np.tile(np.arange(n_wires), strip_start.size),
-            # A wire that is alone is never out of reach: beside the strips it runs on the horns.
-            np.repeat(np.repeat(half_length, counts), n_wires) if n_wires > 1 else endless,
+            np.repeat(half_length, n_wires * counts),
         )
-        rake = [_rake(placement, simulated) for placement in train.placements]
-        leads = leads_of(wires, self.candidates.wire, np.repeat(np.repeat(rake, counts), n_wires))
+        rake = np.repeat([own.rake for own in strips], n_wires * counts)
+        leads = leads_of(wires, self.candidates.wire, rake)
         self.places_along = native.TrainPlaces(all_start, all_places, leads)
         self._move = native.move_contacts.bound(self.places_along)
         self.reach = (
-            max(0.0, -min(map(min, offsets))) + max(0.0, -leads.lead.min(initial=0.0)),
-            max(0.0, max(map(max, offsets))) + leads.lead.max(initial=0.0),
+            max(0.0, -offsets.min()) - leads.lead.min(initial=0.0),
+            max(0.0, offsets.max()) + leads.lead.max(initial=0.0),
         )
         self.outputs = places_and_outputs[self.n_contacts :]
         parts = np.split(self.outputs, np.cumsum(sizes)[:-1])
@@ -248,9 +248,6 @@ class Pantographs:
 
     def predict(self, time: float) -> Heads:
         """Strips at ``time`` as functions of the contact forces. Rank 0 only."""
-        if len(self.models) == 1:
-            self._heads.adopt(self.models[0].predict(time))
-            return self._heads
         for model, strips in self._models_with_contacts:
             self._heads.put(strips, model.predict(time))
         return self._heads
@@ -267,11 +264,8 @@ class Pantographs:
         depth : ndarray, shape (n_contacts,)
             Heights of the strips above the wire at the contacts [m].
         """
-        if len(self.models) == 1:
-            self.models[0].advance(contact_force)
-        else:
-            for model, strips in self._models_with_contacts:
-                model.advance(contact_force[strips])
+        for model, strips in self._models_with_contacts:
+            model.advance(contact_force[strips])
         if self.joints_in_loop:
             self.measure_joints()
         self._write_outputs(contact_force, reported, self._heads.affine, depth)
@@ -296,9 +290,9 @@ class Pantographs:
                 heads.append(moved.stepped)
                 places.append(moved.places())
             else:
-                called = CalledModel(model, partial(self._measure_joint, number))
-                heads.append(called.stepped())
-                places.append(called.places)
+                head, _, own = called_by_kernels(model, partial(self._measure_joint, number))
+                heads.append(head)
+                places.append(own)
             heads[-1].first = strips.start
         return heads, places
 
@@ -351,23 +345,30 @@ class Pantographs:
             if self.lateral:
                 path = FollowedPath(self.across[:2, self._contacts[number]], base)
                 self._followed.append(path)
-            if not _depends_on_place(placement, simulated):
+            data, train = self._data[number], problem.train
+            # It matters where wires cross the strips to a head that rolls or bends.
+            if not (data.strips.flexure or (simulated.head_roll and data.roll)):
                 path = None
             elif path is None:
-                rake = _rake(placement, simulated)
-                path = _lateral_path(problem, placement, base, self._wires, rake)
+                path = LateralPath(
+                    [_crossing(self._wires, k, data.strips.rake) for k in range(self.n_wires)],
+                    train.start - placement.behind,
+                    data.strips.offsets,
+                    train.speed,
+                    base,
+                )
             flow = airflow(problem, simulated, placement)
             self.along_track |= any(own is not None and own.along_track for own in (base, flow))
             operation = Operation(
                 placement.static_force,
                 nominal_height(placement),
-                Stepping(problem.train.raise_time, *newmark, path, base),
+                Stepping(train.raise_time, *newmark, path, base),
                 flow,
                 placement.lowering if simulated.lowering else None,
                 placement.regulator if simulated.regulated_lift else None,
                 simulated.head_roll,
             )
-            model = make_pantograph(_simulated(placement, simulated, self.n_wires), operation)
+            model = make_pantograph(data, operation)
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
@@ -377,9 +378,13 @@ class Pantographs:
 def _simulated(placement: Placement, simulated: Simulated, n_wires: int) -> PantographData:
     """Data of a pantograph below so many wires, without what is not simulated."""
     data = placement.data
-    laws = data.laws if simulated.pantograph_laws else ()
-    flexure = data.strips.flexure if simulated.flexible_strips else None
-    return replace(data, strips=replace(data.strips, wires=n_wires, flexure=flexure), laws=laws)
+    strips = replace(
+        data.strips,
+        wires=n_wires,
+        flexure=data.strips.flexure if simulated.flexible_strips else None,
+        rake=data.strips.rake * simulated.raked_strips,
+    )
+    return replace(data, strips=strips, laws=data.laws if simulated.pantograph_laws else ())
 
 
 def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseMotion | None:
@@ -391,55 +396,16 @@ def _base(problem: Problem, simulated: Simulated, placement: Placement) -> BaseM
     return BaseMotion(vehicle, train.start - placement.behind, train.speed)
 
 
-def _depends_on_place(placement: Placement, simulated: Simulated) -> bool:
-    """Whether it matters where wires cross the strips: to a head that rolls or bends."""
-    bends = simulated.flexible_strips and placement.data.strips.flexure is not None
-    return bends or (simulated.head_roll and placement.data.roll is not None)
-
-
-def _rake(placement: Placement, simulated: Simulated) -> float:
-    """Simulated angle of a pantograph's strips to the cross-section [rad]."""
-    return placement.data.strips.rake * simulated.raked_strips
-
-
-def _lateral_path(
-    problem: Problem,
-    placement: Placement,
-    base: BaseMotion | None,
-    wires: ContactWires,
-    rake: float,
-) -> CrossingPath:
-    """Path on which wires that do not move sideways cross the strips."""
-    train = problem.train
-    paths = [
-        LateralPath(
-            *_crossing(wires, number, rake),
-            train.start - placement.behind,
-            placement.data.strips.offsets,
-            train.speed,
-            base,
-        )
-        for number in range(wires.n_wires)
-    ]
-    return paths[0] if len(paths) == 1 else SeveralPaths(paths)
-
-
 def nominal_height_rule(
-    wires: ContactWires,
-    elasticity: Elasticity,
-    air_speed: float | None = None,
-    contact: ContactLaw | None = None,
-    *,
-    with_laws: bool = True,
+    problem: Problem, simulated: Simulated, wires: ContactWires, elasticity: Elasticity
 ) -> Callable[[Placement], float]:
     """Head height at which the static force is defined.
 
     That of the placement, or else the mean height of a head that lifts the contact wires in the
-    stretch of ``elasticity`` with the static force and that of still air at ``air_speed`` [m/s], so
+    stretch of ``elasticity`` with the static force and that of still air at the train's speed, so
     that the base spring neither adds to the mean force nor takes from it. The head of a chain that
-    is tied to its base stands above the wires by the depth of its ``contact`` law; others change
-    their force by less than a hundredth over that depth, which is left out. ``with_laws`` says
-    whether laws of pantographs that are not linear act.
+    is tied to its base stands above the wires by the depth of its contact law; others change
+    their force by less than a hundredth over that depth, which is left out.
     """
     x = elasticity.x
     at_rest = np.stack([wires.rest_height_of(wire, x) for wire in range(wires.n_wires)], axis=1)
@@ -448,13 +414,13 @@ def nominal_height_rule(
         if placement.nominal_height is not None:
             return placement.nominal_height
         force = placement.static_force
-        if air_speed is not None and placement.data.meets_air:
-            force += steady_forces(placement.data, air_speed).whole
+        data = _simulated(placement, simulated, wires.n_wires)
+        if simulated.meets_air and data.meets_air:
+            force += steady_forces(data, problem.train.speed).whole
         lifted = elasticity.pressed(at_rest, force)
         above = 0.0
-        data = placement.data if with_laws else replace(placement.data, laws=())
-        if contact is not None and isinstance(data, LumpedData) and data.tied:
-            above = contact.depth(force / (len(placement.data.strips.offsets) * wires.n_wires))
+        if isinstance(data, LumpedData) and data.tied:
+            above = problem.contact.depth(force / len(data.strips.contact_offsets))
         # By trapezoids; scipy.integrate, which has the rule, loads solvers for 0.03 s.
         mean = float(np.sum(np.diff(x) * (lifted[1:] + lifted[:-1]) / 2.0) / (x[-1] - x[0]))
         return mean + above

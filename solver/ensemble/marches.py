@@ -113,11 +113,8 @@ def _begin(shared: SharedLine, lane: Lane, number: int, at_rest: LineAtRest) -> 
     problem, model, form, lift = at_rest
     model = replace(model, problem=problem, simulated=simulated(problem))
     laws, train = model.simulated, problem.train
-    air_speed = train.speed if laws.meets_air else None
     shared.hang(lane, at_rest)
-    height = nominal_height_rule(
-        lane.wires_at_rest, lift, air_speed, problem.contact, with_laws=laws.pantograph_laws
-    )
+    height = nominal_height_rule(problem, laws, lane.wires_at_rest, lift)
     pantographs = Pantographs(shared.comm, problem, laws, lane.wires_at_rest, height)
     for one in pantographs.models:
         stepped_by_kernels(one)  # an error of another would end a step of all lanes

@@ -70,7 +70,7 @@ class FixedPoint(Scheme):
         self._predicted[1] = sped
         line.load_at(time)
         line.internal_forces()
-        self._nowhere = ~self.interaction.present()
+        self._nowhere = self.interaction.presence == 0.0
         if self.pantographs.lateral:
             find_crossings(self.interaction, self.pantographs, time)
         heads = self._heads_everywhere(time)

@@ -146,10 +146,7 @@ def set_up_of(
     simulated = model.simulated
     _refuse(at_rest)
     wires = ContactWires(model, form, distribute(model, 1, 0))
-    air_speed = problem.train.speed if simulated.meets_air else None
-    height = nominal_height_rule(
-        wires, lift, air_speed, problem.contact, with_laws=simulated.pantograph_laws
-    )
+    height = nominal_height_rule(problem, simulated, wires, lift)
     pantographs = Pantographs(comm, problem, simulated, wires, height)
     heads = [_stepped(model) for model in pantographs.models]
     if pantographs.lateral and any(head.is_crossed for head in heads):

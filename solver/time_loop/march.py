@@ -117,12 +117,8 @@ class March:
         self._form = form
         self.ownership = distribute(model, comm.size, comm.rank)
         self._wire = ContactWires(model, form, self.ownership)
-        air_speed = problem.train.speed if model.simulated.meets_air else None
-        effects = model.simulated
-        height = nominal_height_rule(
-            self._wire, elasticity, air_speed, problem.contact, with_laws=effects.pantograph_laws
-        )
-        self._pantographs = Pantographs(comm, problem, effects, self._wire, height)
+        height = nominal_height_rule(problem, model.simulated, self._wire, elasticity)
+        self._pantographs = Pantographs(comm, problem, model.simulated, self._wire, height)
         self._moving = MovingColumns()
         # Arrays of a long line are large, so that the first parts take these.
         self._set_up(unchanged(model, form), self._wire)

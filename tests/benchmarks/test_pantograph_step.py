@@ -57,7 +57,7 @@ def table() -> Iterator[None]:
 def path(offsets: tuple[float, ...], base: BaseMotion | None = None) -> LateralPath:
     supports = np.arange(0.0, 1400.0, 55.0)
     stagger = tuple(0.2 * (-1) ** i for i in range(supports.size))
-    return LateralPath(supports, stagger, 100.0, offsets, 80.0, base)
+    return LateralPath([(supports, stagger)], 100.0, offsets, 80.0, base)
 
 
 def measure(benchmark: Any, name: str, data: PantographData, rolls: bool, moves: bool) -> None:

@@ -109,7 +109,8 @@ def static_force(pantograph: RaisingPantograph, head_height: float, time: float 
     frame, zero = data.frame, data.head.offset + data.base_height
     on_head, on_arm, on_bodies = np.zeros(3)
     if pantograph._air is not None:
-        on_head, on_arm, on_bodies = pantograph._blowing(pantograph._air.now(time))
+        on_head, on_arm, on_bodies = pantograph._air.now(time)
+        on_head += data.blown_head * on_bodies
     for _ in range(50):
         previous, below = force, force - on_head
         arm = head_height + below / data.head.stiffness + data.strips.compression(below) - zero

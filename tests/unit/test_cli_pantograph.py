@@ -102,3 +102,12 @@ def test_files_are_not_overwritten_unless_told_to(written: tuple[Path, str]) -> 
     before = (folder / "receptance.csv").read_bytes()
     assert invoke("en50318_2002", "-o", str(folder), "--force").exit_code == 0
     assert (folder / "receptance.csv").read_bytes() != before
+
+
+def test_laws_that_are_left_out_are_named() -> None:
+    law = "{type = 'damper', at_mass = 2, up_N_s_per_m = 500.0, down_N_s_per_m = 900.0}"
+    words = ("en50318_2002", f"pantographs.reference.laws=[{law}]")
+    sentence = "left out: the pantograph's laws, which are not linear"
+    assert sentence in invoke(*words).output
+    assert sentence not in invoke(*words, "effects.pantograph_laws=false").output
+    assert sentence not in invoke("en50318_2002").output

@@ -223,7 +223,7 @@ def test_velocities_and_accelerations_are_derivatives_of_places() -> None:
 
 def test_a_vehicle_that_sways_moves_the_wire_on_the_strip_the_other_way() -> None:
     base = BaseMotion(VehicleMotion((), (Harmonic(0.05, 2.0),)), 100.0, 70.0)
-    path = LateralPath(np.array([0.0, 1e3]), (0.2, -0.2), 100.0, (0.3,), 70.0, base)
+    path = LateralPath([(np.array([0.0, 1e3]), (0.2, -0.2))], 100.0, (0.3,), 70.0, base)
     path.move_to(0.4)
     along = 100.0 + 0.3 + 28.0
     sway, omega = 0.05 * np.sin(4 * np.pi * 0.4), 4 * np.pi

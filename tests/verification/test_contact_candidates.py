@@ -18,7 +18,7 @@ from small_lines import WHOLE, mesh_of, numerics, train
 
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.head.wire_crossing import LateralPath, SeveralPaths
+from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
@@ -216,8 +216,9 @@ def test_a_head_under_two_wires_is_that_head_at_two_places(rolls: bool) -> None:
     data = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0), Strips(2, 0.5), roll)
     places = (0.3, -0.2)
 
-    def path(y: float) -> LateralPath:
-        return LateralPath(np.array([0.0, 100.0]), (y, y), 10.0, data.strips.offsets, 20.0)
+    def path(*places: float) -> LateralPath:
+        courses = [((0.0, 100.0), (y, y)) for y in places]
+        return LateralPath(courses, 10.0, data.strips.offsets, 20.0)
 
     def head(lateral: Any, wires: int) -> LumpedPantograph:
         own = replace(data, strips=replace(data.strips, wires=wires))
@@ -227,7 +228,7 @@ def test_a_head_under_two_wires_is_that_head_at_two_places(rolls: bool) -> None:
         made.place(5.0)
         return made
 
-    both = head(SeveralPaths([path(y) for y in places]), 2)
+    both = head(path(*places), 2)
     alone = [head(path(y), 1) for y in places]
     for time in (1e-3, 2e-3):
         state = both.predict(time)

@@ -106,7 +106,9 @@ def test_the_nominal_height_of_twins_is_that_of_the_wire() -> None:
     for line in (one_wire(), twins(0.5)):
         model, form = find_form(problem_on(line, train=run), mesh_of(line, 2))
         wires = ContactWires(model, form, distribute(model, 1, 0))
-        rule = nominal_height_rule(wires, elasticity(model, *middle_span(line)))
+        rule = nominal_height_rule(
+            model.problem, model.simulated, wires, elasticity(model, *middle_span(line))
+        )
         heights.append(rule(run.placements[0]))
     check("nominal height [m]", heights[1], heights[0], within=1e-9)
 

@@ -159,7 +159,7 @@ def test_the_receptance_where_the_wire_is_is_that_of_finite_elements(
 def stepped(data: LumpedData, stagger: float, n: int = 400) -> np.ndarray:
     """Heights of the strips after each step under a force that swings, on a zigzag."""
     x = np.arange(0.0, 200.0, 20.0)
-    path = LateralPath(x, tuple(stagger * (-1) ** i for i in range(x.size)), 10.0,
+    path = LateralPath([(x, tuple(stagger * (-1) ** i for i in range(x.size)))], 10.0,
                        data.strips.offsets, 70.0)  # fmt: skip
     one = LumpedPantograph(data, 120.0, 5.0, Stepping(0.0, 1e-3, lateral=path))
     one.place(5.0)
@@ -187,7 +187,7 @@ def test_a_still_wire_at_the_end_of_a_strip_rests_where_statics_say() -> None:
     """At 0.45 m from the middle: compliance of springs and beam, from the modes themselves."""
     data = LumpedData((9.0, 15.0), (4200.0, 1e7), (300.0, 1e5), strips(6))
     damped = replace(data.strips, suspension=replace(SUSPENSION, damping=300.0))
-    path = LateralPath(np.array([0.0, 1e3]), (0.45, 0.45), 10.0, (0.0,), 70.0)
+    path = LateralPath([(np.array([0.0, 1e3]), (0.45, 0.45))], 10.0, (0.0,), 70.0)
     stepping = Stepping(0.0, 2e-3, lateral=path)
     one = LumpedPantograph(replace(data, strips=damped), 0.0, 5.0, stepping)
     one.place(5.0)

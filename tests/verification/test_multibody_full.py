@@ -175,7 +175,7 @@ def test_wire_beside_the_middle_rolls_the_head() -> None:
 
     With Newmark's parts of springs and dampers, 6000 N/m and 26 N s/m, 0.335 m to both sides.
     """
-    beside = LateralPath(np.array([0.0, 100.0]), (0.2, 0.2), 0.0, (0.0,), 50.0)
+    beside = LateralPath([(np.array([0.0, 100.0]), (0.2, 0.2))], 0.0, (0.0,), 50.0)
     pantograph = full(lateral=beside)
     pantograph.place(HEIGHT)
     found = pantograph.predict(DT).height_compliance

@@ -78,7 +78,7 @@ def test_strips_roll_and_a_moving_base_are_the_same_for_both_models() -> None:
     vehicle = VehicleMotion((Harmonic(0.02, 2.0, 0.3),), (Harmonic(0.05, 1.0),))
     base = BaseMotion(vehicle, 100.0, 70.0)
     path = LateralPath(
-        np.array([0.0, 150.0, 300.0]), (0.2, -0.2, 0.2), 100.0, strips.offsets, 70.0, base
+        [(np.array([0.0, 150.0, 300.0]), (0.2, -0.2, 0.2))], 100.0, strips.offsets, 70.0, base
     )
     found = RaisingPantograph(data, Stepping(0.5, 1e-3, lateral=path, base=base))
     expected = LumpedPantograph(chain, 120.0, 5.0, Stepping(0.5, 1e-3, lateral=path, base=base))

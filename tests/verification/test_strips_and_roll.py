@@ -34,7 +34,7 @@ LEFT = 0.03 * np.exp(-10.0)
 
 def straight(place: float, offsets: tuple[float, ...] = (0.0,)) -> LateralPath:
     """A wire that stays at one lateral position [m]."""
-    return LateralPath(np.array([0.0, 1e4]), (place, place), 100.0, offsets, 70.0)
+    return LateralPath([(np.array([0.0, 1e4]), (place, place))], 100.0, offsets, 70.0)
 
 
 def test_two_equal_strips_on_springs_are_one_more_mass_of_a_chain() -> None:
@@ -123,7 +123,7 @@ def test_a_rolling_head_under_a_wire_that_wanders_follows_its_equations() -> Non
         exact = piece.y[:, -1]
     steps, errors, rolls = [4e-3, 2e-3, 1e-3, 0.5e-3], [], []
     for dt in steps:
-        path = LateralPath(supports, stagger, start, (0.0,), speed)
+        path = LateralPath([(supports, stagger)], start, (0.0,), speed)
         pantograph = LumpedPantograph(
             replace(TWO, roll=ROLL), 120.0, 5.5, Stepping(0.0, dt, lateral=path)
         )
@@ -179,7 +179,7 @@ def test_the_paper_s_head_rolls_under_a_wandering_wire_like_all_its_bodies() -> 
     """
     data, force, dt = paper.data(), 150.0, 1e-3
     path = LateralPath(
-        np.array([0.0, 50.0, 100.0, 150.0]), (0.2, -0.2, 0.2, -0.2), 10.0, (0.0,), 80.0
+        [(np.array([0.0, 50.0, 100.0, 150.0]), (0.2, -0.2, 0.2, -0.2))], 10.0, (0.0,), 80.0
     )
     rolling = raising_data(data, force, 5.0)
     pantographs = (

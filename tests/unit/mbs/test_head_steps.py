@@ -201,7 +201,7 @@ def test_strips_heavier_than_their_head_are_refused() -> None:
 
 
 def test_where_the_wire_crosses_a_head_that_cannot_roll_makes_no_difference() -> None:
-    path = LateralPath(np.array([0.0, 100.0]), (0.2, -0.2), 0.0, (0.0,), 50.0)
+    path = LateralPath([(np.array([0.0, 100.0]), (0.2, -0.2))], 0.0, (0.0,), 50.0)
     pantographs = (
         LumpedPantograph(THREE, 120.0, 5.5, Stepping(0.0, DT, lateral=path)),
         LumpedPantograph(THREE, 120.0, 5.5, Stepping(0.0, DT)),

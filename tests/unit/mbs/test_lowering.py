@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from catenary.mbs.build import Operation, make_pantograph
-from catenary.mbs.head.newmark_head import Raising, parts_of
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import Raising, Stepping
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
@@ -33,12 +32,12 @@ def test_a_pantograph_is_lowered_from_where_its_raising_was() -> None:
 
 def test_the_parts_of_many_steps_are_those_of_each() -> None:
     times = 1e-3 * np.arange(1, 700)
-    each = [Raising(0.5)(time) for time in times]
+    each = [float(Raising(0.5)(time)) for time in times]
     # A cosine of an array may be rounded otherwise than one alone: half of 2.2e-16.
     for some in (slice(None), slice(100, 103), slice(498, None), slice(500, None)):
-        found = parts_of(Raising(0.5), times[some])
+        found = Raising(0.5)(times[some])
         assert found == pytest.approx(each[some], rel=0.0, abs=1.2e-16)
-    assert (parts_of(Raising(0.0), times) == 1.0).all()
+    assert (Raising(0.0)(times) == 1.0).all()
 
 
 def lowered(base: BaseMotion | None, time: float = 0.1) -> LoweredPantograph:

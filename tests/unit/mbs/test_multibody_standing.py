@@ -16,7 +16,7 @@ from catenary.mbs.build import Operation, make_pantograph, raising_data
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, describe, reduced, stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.mechanism.reduction import Places, reduce_mechanism
+from catenary.mbs.mechanism.reduction import Raised, reduce_mechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import Prismatic, Revolute
@@ -181,7 +181,7 @@ def test_places_that_an_actuator_moves_are_found_anew() -> None:
             BumpStop("stop", SPACE, "float", longest=1.0, stiffness=5000.0),
         ),
     )
-    heights, places = np.linspace(0.9, 1.3, 9), Places("jack")
+    heights, places = np.linspace(0.9, 1.3, 9), Raised(system, "mast", actuator="jack")
     for force in (300.0, 500.0):
         pushed = system.with_force_changed("jack", force=force)
         found = reduce_mechanism(pushed, "mast", heights, places=places)

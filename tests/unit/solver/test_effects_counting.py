@@ -320,7 +320,7 @@ def test_point_masses_are_those_of_the_parts(mesh: LineMesh) -> None:
 def test_a_head_has_a_roll_only_if_asked() -> None:
     """As `Pantographs` asks: with where the wire crosses the strips, or without."""
     data = replace(EN_PANTOGRAPH, roll=Turning(2.0, 470.0, 1.0))
-    path = LateralPath(np.array([0.0, 100.0]), (0.2, 0.2), 0.0, (0.0,), 70.0)
+    path = LateralPath([(np.array([0.0, 100.0]), (0.2, 0.2))], 0.0, (0.0,), 70.0)
     for lateral, size in ((None, 6), (path, 9)):
         operation = Operation(120.0, 5.5, Stepping(0.5, 1e-3, lateral=lateral))
         assert make_pantograph(data, operation).state().size == size

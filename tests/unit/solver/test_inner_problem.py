@@ -53,7 +53,10 @@ class Case:
 
     def solve(self) -> InnerSolution:
         law = LawInSteps(
-            self.heads.n, self.law.stiffness, self.law.damping, pulls=not self.may_lose_contact
+            self.heads.height.size,
+            self.law.stiffness,
+            self.law.damping,
+            pulls=not self.may_lose_contact,
         )
         return InnerProblem(law, coupled(self.coupling, self.kept)).solve(self.line, self.heads)
 

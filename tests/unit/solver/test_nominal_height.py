@@ -27,7 +27,7 @@ def height_on(line: LineData, elements: int, placement: Placement) -> float:
     model, form = find_form(problem_of(line, HANGING), mesh_of(line, elements))
     lift = elasticity(model, *middle_span(model.problem.line))
     wires = ContactWires(model, form, distribute(model, 1, 0))
-    return nominal_height_rule(wires, lift)(placement)
+    return nominal_height_rule(model.problem, model.simulated, wires, lift)(placement)
 
 
 def test_a_given_height_is_taken() -> None:
@@ -64,7 +64,9 @@ def test_it_rises_with_the_static_force_by_the_mean_elasticity() -> None:
     line = ac_simple_line(5)
     model, form = find_form(problem_of(line, HANGING), mesh_of(line, 4))
     lift = elasticity(model, *middle_span(model.problem.line))
-    rule = nominal_height_rule(ContactWires(model, form, distribute(model, 1, 0)), lift)
+    rule = nominal_height_rule(
+        model.problem, model.simulated, ContactWires(model, form, distribute(model, 1, 0)), lift
+    )
     low, high = (rule(Placement(EN_PANTOGRAPH, force, 0.0)) for force in (50.0, 150.0))
     parts = (lift.lift[1:] + lift.lift[:-1]) / 2 * np.diff(lift.x)
     mean = parts.sum() / (lift.x[-1] - lift.x[0])
