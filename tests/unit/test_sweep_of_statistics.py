@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -218,6 +219,22 @@ def test_the_same_call_completes_histories(
     assert joined.stat().st_mtime_ns != made
     for name, table in whole.items():
         np.testing.assert_array_equal(again[name], table)
+
+
+@pytest.mark.process
+def test_parts_of_killed_processes_are_removed(scene: catenary.Scene, tmp_path: Path) -> None:
+    """A killed sweep left hidden parts of histories for ever, beside those of processes at work."""
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    kept = tmp_path / FOLDER
+    kept.mkdir()
+    gone = [tmp_path / f".histories.h5.{dead.pid}.part"]
+    gone += [kept / f".{64 * 'a'}.{kind}.{dead.pid}.part" for kind in ("h5", "json")]
+    stay = [kept / f".{64 * 'a'}.h5.{os.getpid()}.part", tmp_path / f".notes.{dead.pid}.part"]
+    for path in (*gone, *stay):
+        path.touch()
+    histories(scene, tmp_path)
+    assert not any(path.exists() for path in gone) and all(path.exists() for path in stay)
 
 
 def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) -> None:

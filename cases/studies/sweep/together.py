@@ -99,6 +99,8 @@ class Ensemble(NamedTuple):
             folder = None if part is None else part.folder
             kept = histories = KeptHistories(out, self.histories, sweep, options.force, folder)
             files = [histories.file_of(depends_on(piece)) for piece in pieces]
+        if part is None:  # parts of a sweep share a folder, without a lock
+            on_root(comm, kept.remove_parts)
         n_at_once = at_once(options.n_jobs, comm)
         if comm.size > 1:  # a march is one rank's: all without -j would do the same
             n_at_once = comm.size
