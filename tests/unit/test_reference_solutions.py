@@ -292,6 +292,11 @@ def stretch(force: str) -> str:
             'has no number in column "pantograph_N", row 2 below',
         ),
         (rows(1.0).replace("\n2,2", "\n2,nan"), ONE, "needs a finite number"),
+        (
+            rows(1.0).replace("\n2,2", '\n"2,5",2'),
+            ONE,
+            'has "2,5" in column "place_m", row 2 below its names; write decimal points',
+        ),
         ("of,quantity\nline,max_uplift_mm\n", ONE, 'has no column "value"'),
         ("of,quantity,value\nline,max_uplift_mm,nan\n", ONE, 'no number in column "value", row 1'),
         ("of,quantity,value\nline,max_uplift_mm,0.07\n", ONE, "gives 0.07 for max_uplift_mm"),
