@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import operator
 import tempfile
-from contextlib import suppress
 from hashlib import blake2b, file_digest
 from pathlib import Path
 from typing import Any, NoReturn
@@ -13,7 +12,7 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.lone_process import alone
-from catenary.callers import is_truth, number_of, path_of
+from catenary.callers import is_truth, number_of, numbers_of, path_of
 from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.scene import Scene
@@ -468,11 +467,7 @@ class Simulation:
         return ""
 
     def _add(self, name: str, value: Any) -> None:
-        values = None
-        with suppress(TypeError, ValueError):
-            values = None if is_truth(value) else np.asarray(value, dtype=float)
-        if values is None:
-            raise InputError(f"{name} is {shown(value)}; it must be a number or numbers")
+        values = numbers_of(value, name)
         own = self._own.inputs[name]
         if values.shape not in ((), own.shape):
             raise InputError(
