@@ -146,7 +146,7 @@ class Simulation:
         try:
             done = self._own.step(min(steps, self.steps_left + 1))
         except RuntimeError as error:
-            why = f"after {self.time:g} s {error}{self._not_finite()}"
+            why = f"after {self.time:g} s {error}{self._state_in_words()}"
             raise RunBroken(f"{why}; restore() an earlier state") from error
         self._ended = not done
         return done
@@ -458,13 +458,21 @@ class Simulation:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.close()
 
-    def _not_finite(self) -> str:
-        """A clause on inputs that are no numbers."""
+    def _state_in_words(self) -> str:
+        """A clause on inputs that are no numbers, or else on what tells of one that drives a
+        pantograph away: heights, forces and inputs that are not zero."""
         inputs = self._own.inputs
-        for name in inputs.dtype.names or ():
+        names = inputs.dtype.names or ()
+        for name in names:
             if not np.isfinite(inputs[name]).all():
                 return f": {name} is {inputs[name].tolist()}; it must be finite"
-        return ""
+        given = {name: inputs[name] for name in names if inputs[name].any()}
+        if not given:
+            return ""
+        told = {"head_height": self._own.head_height, "contact_force": self._own.contact_force}
+        told |= given
+        values = (f"{name} {[float(f'{one:.4g}') for one in own]}" for name, own in told.items())
+        return f": it has {', '.join(values)}"
 
     def _add(self, name: str, value: Any) -> None:
         values = numbers_of(value, name)

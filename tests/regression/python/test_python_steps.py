@@ -267,6 +267,16 @@ def test_a_line_that_runs_away_under_a_controller_says_so(scene: catenary.Scene)
         assert sim.step(100)
 
 
+def test_a_controller_that_drives_a_mechanism_down_is_told() -> None:
+    """A run names the heights; steps from outside listed all that might be wrong."""
+    with catenary.Simulation(catenary.load("ambrosio2012", short=True)) as sim:
+        sim.step(50)
+        sim.lift_force = -2000.0
+        says = r": it has head_height \[[\d.]+\], contact_force \[0.0\], lift_force \[-2000.0\]"
+        with pytest.raises(catenary.RunBroken, match=says):
+            sim.step(1000)
+
+
 def test_a_damaged_state_is_refused(scene: catenary.Scene) -> None:
     # Numbers of places are in it: with one of them changed the process ended.
     with catenary.Simulation(scene) as sim:
