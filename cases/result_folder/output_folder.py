@@ -14,14 +14,13 @@ from typing import NamedTuple
 from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.base.paths import is_folder, is_there
+from catenary.base.whole_files import new_part, part_of
 from catenary.cases.result_folder.folder_lock import is_alive, refusal
 from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.own_files import (
     FIELD_FILES,
     OWN_FILES,
     RUN_FILE,
-    new_part,
-    part_of,
     parts_in,
     remove_parts,
 )

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
 import re
 import time
 from collections.abc import Iterable
@@ -61,19 +60,6 @@ OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, MP4, GIF, VARIANT_FILE)
 _PART = re.compile(r"\.(.+)\.(\d{1,9})\.part")
 # A report may be written beside a run; its files are made in less [s].
 _MAKING = 600.0
-
-
-def part_of(path: Path, process: int) -> Path:
-    """Name under which a process makes a file that is to appear whole."""
-    return path.with_name(f".{path.name}.{process}.part")
-
-
-def new_part(path: Path) -> Path:
-    """The name for this process, free to be written: a file of a dead process with the same number,
-    or a link, is removed."""
-    part = part_of(path, os.getpid())
-    part.unlink(missing_ok=True)
-    return part
 
 
 def remove_stale(folder: Path, names: Iterable[str] = OWN_FILES[1:]) -> None:
