@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -466,6 +467,23 @@ def test_an_installer_reads_lengths_and_changes() -> None:
     assert [row["dropper"] for row in table.rows[:10]] == [*range(1, 10), 1]
     assert all(row["moved_mm"] == 0.0 for row in table.rows)
     assert max(abs(row["change_mm"]) for row in table.rows) > 1.0
+
+
+def test_droppers_that_stay_as_they_are_have_no_table(evaluated: Any) -> None:
+    """A tension that stretches them by a thousandth of a millimetre printed a table of zeros."""
+    task = task_of(
+        variables=[{"key": "line.contact_wire.tension_N", "change": [-50.0, 50.0]}],
+        search={"most_runs": 4},
+    )
+    evaluated(lambda scene: summary(20.0 - 1e-3 * scene.line.contact_wire.tension_N))
+    said: list[str] = []
+    plan = study.make_plan(draft(), task)
+    (found,) = study.optimise(plan, say=said.append)
+    assert found.found.change.any() and said[0] == "gradient: 1 variable, 2 scenes"
+    assert [table.title for table in output.tables_of(plan, found)] == ["Variables", "Checks"]
+    moved = [row | {"change_mm": 0.06} for row in found.droppers.rows]
+    shifted = replace(found, droppers=replace(found.droppers, rows=moved))
+    assert "Lengths of droppers" in output.tables_of(plan, shifted)[1].title
 
 
 def test_droppers_keep_a_force_at_rest() -> None:
