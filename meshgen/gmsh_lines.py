@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import gmsh
@@ -12,6 +11,7 @@ import numpy as np
 
 from catenary.base.errors import CatenaryError, InputError, RunBroken
 from catenary.base.python_signals import python_signals_kept
+from catenary.base.whole_files import appears_whole
 from catenary.meshgen.geometry import Cuts, divisions_of, find_cuts
 from catenary.meshgen.hardware import Droppers
 from catenary.meshgen.line import Line
@@ -69,25 +69,21 @@ def write_mesh(
 
 def _write_whole(path: Path) -> None:
     """Write the present mesh so that an earlier file stays until the new one is whole."""
-    part = path.with_name(f".{path.stem[:100]}.{os.getpid()}.part.msh")
     try:
-        gmsh.write(str(part))
-        # On a full disk Gmsh ends in the middle of the file and says nothing.
-        with part.open("rb") as file:
-            file.seek(max(0, part.stat().st_size - len(_END)))
-            if file.read().strip() != _END.strip():
-                raise RunBroken(
-                    f"the mesh file {path} cannot be written to its end: free some space or choose "
-                    "another file"
-                )
-        part.replace(path)
+        with appears_whole(path, ".msh") as part:
+            gmsh.write(str(part))
+            # On a full disk Gmsh ends in the middle of the file and says nothing.
+            with part.open("rb") as file:
+                file.seek(max(0, part.stat().st_size - len(_END)))
+                if file.read().strip() != _END.strip():
+                    raise RunBroken(
+                        f"the mesh file {path} cannot be written to its end: free some space or "
+                        "choose another file"
+                    )
     except CatenaryError:
         raise
     except Exception as error:  # gmsh raises nothing more particular
         raise InputError(f"the mesh file {path} cannot be written: {error}") from error
-    finally:
-        with suppress(OSError):
-            part.unlink()
 
 
 @contextmanager

@@ -14,6 +14,8 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from catenary.base.errors import InputError
 from catenary.base.lone_process import alone, world
 from catenary.base.parallel import launched_by_mpirun, on_root
@@ -117,11 +119,15 @@ def listed(names: str | Iterable[str], argument: str) -> list[str]:
 
 
 def number_of(value: Any, argument: str) -> float:
-    """The number of an argument. Raises InputError if it is none."""
+    """The number of an argument. Raises InputError if it is none, as a text is not."""
     with suppress(TypeError, ValueError):
-        if not is_truth(value):
+        if not is_truth(value) and not _is_text(value):
             return float(value)
     raise InputError(f"{argument} is {shown(value)}; it must be a number")
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str | bytes | bytearray)
 
 
 def is_truth(value: Any) -> bool:
@@ -129,6 +135,17 @@ def is_truth(value: Any) -> bool:
     if isinstance(value, list | tuple):
         return any(map(is_truth, value))
     return isinstance(value, bool) or str(getattr(value, "dtype", "")) == "bool"
+
+
+def numbers_of(value: Any, argument: str) -> np.ndarray:
+    """A number, shape (), or numbers. Raises InputError if they are none."""
+    with suppress(TypeError, ValueError):
+        given = np.asarray(value)
+        # Texts such as "5", dates and truths would pass for numbers.
+        is_number = given.dtype.kind in "iuf" and not is_truth(value)
+        if is_number or (given.dtype.kind == "O" and not any(map(_is_text, given.flat))):
+            return given.astype(float)
+    raise InputError(f"{argument} is {shown(value)}; it must be a number or numbers")
 
 
 def path_of(path: Any, argument: str, wanted: str = "a path") -> Path:

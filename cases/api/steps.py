@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import operator
 import tempfile
-from contextlib import suppress
 from hashlib import blake2b, file_digest
 from pathlib import Path
 from typing import Any, NoReturn
@@ -13,7 +12,7 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.lone_process import alone
-from catenary.callers import is_truth, number_of, path_of
+from catenary.callers import is_truth, number_of, numbers_of, path_of
 from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.scene import Scene
@@ -147,7 +146,7 @@ class Simulation:
         try:
             done = self._own.step(min(steps, self.steps_left + 1))
         except RuntimeError as error:
-            why = f"after {self.time:g} s {error}{self._not_finite()}"
+            why = f"after {self.time:g} s {error}{self._state_in_words()}"
             raise RunBroken(f"{why}; restore() an earlier state") from error
         self._ended = not done
         return done
@@ -459,20 +458,24 @@ class Simulation:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.close()
 
-    def _not_finite(self) -> str:
-        """A clause on inputs that are no numbers."""
+    def _state_in_words(self) -> str:
+        """A clause on inputs that are no numbers, or else on what tells of one that drives a
+        pantograph away: heights, forces and inputs that are not zero."""
         inputs = self._own.inputs
-        for name in inputs.dtype.names or ():
+        names = inputs.dtype.names or ()
+        for name in names:
             if not np.isfinite(inputs[name]).all():
                 return f": {name} is {inputs[name].tolist()}; it must be finite"
-        return ""
+        given = {name: inputs[name] for name in names if inputs[name].any()}
+        if not given:
+            return ""
+        told = {"head_height": self._own.head_height, "contact_force": self._own.contact_force}
+        told |= given
+        values = (f"{name} {[float(f'{one:.4g}') for one in own]}" for name, own in told.items())
+        return f": it has {', '.join(values)}"
 
     def _add(self, name: str, value: Any) -> None:
-        values = None
-        with suppress(TypeError, ValueError):
-            values = None if is_truth(value) else np.asarray(value, dtype=float)
-        if values is None:
-            raise InputError(f"{name} is {shown(value)}; it must be a number or numbers")
+        values = numbers_of(value, name)
         own = self._own.inputs[name]
         if values.shape not in ((), own.shape):
             raise InputError(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from catenary.base.errors import CatenaryError, InputError
-from catenary.base.paths import is_folder
+from catenary.base.paths import is_file, is_folder
 from catenary.cases.cli.app import Force, RunFolder, folder_option, records_of, serial_verb
 from catenary.cases.terminal import console
+from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.film.options import View
 
 if TYPE_CHECKING:
@@ -157,7 +159,20 @@ def compare(
     from catenary.postproc.evaluate.compare import compare as compare_runs
 
     folders = [first, *others]
+    _refuse_tables(folders)
     console.say(compare_runs(*folders, records=[examined(one) for one in folders]).rstrip())
+
+
+def _refuse_tables(runs: Sequence[Path]) -> None:
+    """Refuse a file that is no result file by its name and its content: a measurement, perhaps."""
+    import h5py
+
+    for path in runs:
+        if is_file(path) and path.suffix != Path(RUN_FILE).suffix and not h5py.is_hdf5(path):
+            raise InputError(
+                f"{path} is neither a run nor a measurement: a run is its folder, or {RUN_FILE} "
+                "there, and a measurement is a text file whose name ends in .csv"
+            )
 
 
 def _compare_measured(

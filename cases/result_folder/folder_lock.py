@@ -98,17 +98,8 @@ class Owner:
 
     @property
     def alive(self) -> bool:
-        """Whether the process is there; only for those of the same process numbers.
-
-        One that has ended and whose parent has not taken its exit code yet (a zombie) is not.
-        """
-        try:
-            os.kill(self.pid, 0)
-        except ProcessLookupError:
-            return False
-        except OSError:  # of another user
-            pass
-        return _started(self.pid) in ("", self.started) and _stat(self.pid)[:1] != ["Z"]
+        """Whether the process is there; only for those of the same process numbers."""
+        return is_alive(self.pid) and _started(self.pid) in ("", self.started)
 
 
 def myself(command: str) -> Owner:
@@ -149,6 +140,20 @@ def _line(path: Path) -> str:
         return path.read_text(encoding="utf-8").strip()
     except (OSError, ValueError):  # not Linux
         return ""
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process of this number is there.
+
+    One that has ended and whose parent has not taken its exit code yet (a zombie) is not.
+    """
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # of another user
+        pass
+    return _stat(pid)[:1] != ["Z"]
 
 
 def _namespace() -> str:

@@ -7,21 +7,21 @@ import errno
 import logging
 import os
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.base.paths import is_folder, is_there
-from catenary.cases.result_folder.folder_lock import refusal
+from catenary.base.whole_files import new_part, part_of
+from catenary.cases.result_folder.folder_lock import is_alive, refusal
 from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.own_files import (
     FIELD_FILES,
     OWN_FILES,
     RUN_FILE,
-    new_part,
-    part_of,
+    parts_in,
     remove_parts,
 )
 
@@ -76,6 +76,24 @@ def prepare(folder: Path, force: bool) -> None:
     finally:
         with contextlib.suppress(OSError):
             trial.unlink()
+
+
+def remove_dead_parts(folder: Path, names: Container[str] | None = None) -> None:
+    """Remove parts of files that killed processes left. Not collective.
+
+    Only who holds the folder's lock may.
+
+    Parameters
+    ----------
+    folder : Path
+        It need not be there.
+    names : container of str, optional
+        The files; all if absent.
+    """
+    for path, name, process in parts_in(folder):
+        if (names is None or name in names) and not is_alive(process):
+            with contextlib.suppress(OSError):
+                path.unlink()
 
 
 def run_folder(path: str | Path) -> Path:

@@ -24,6 +24,7 @@ from catenary.base.parallel import on_root
 from catenary.base.paths import is_file
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.workers import Outcome, each, in_order
+from catenary.cases.result_folder.output_folder import remove_dead_parts
 from catenary.cases.scene.input.plain_text import read_text
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.report.study_table import Content, write_files
@@ -176,6 +177,12 @@ class KeptRows:
         text = json.dumps(plain(depends_on), sort_keys=True)
         return self._folder / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
 
+    def remove_parts(self) -> None:
+        """Remove parts of files that killed processes left. Not collective; only who holds the lock
+        of the study's folder may."""
+        if self._folder is not None:
+            remove_dead_parts(self._folder)
+
     def forget(self) -> None:
         """Remove all records, once the study's own table holds everything. Not collective."""
         if self._folder is not None:
@@ -248,4 +255,6 @@ def held_study(
         yield HeldStudy(None, comm, NOTHING_KEPT)
         return
     with held(out, comm, command):
-        yield HeldStudy(out, comm, KeptRows(out, force and comm.rank == 0))
+        kept = KeptRows(out, force and comm.rank == 0)
+        on_root(comm, kept.remove_parts)
+        yield HeldStudy(out, comm, kept)

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
+import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from catenary.base.errors import InputError
@@ -78,6 +79,51 @@ class BoundTable(Table):
     def scale(self) -> float:
         """Scale of margins: the absolute bound, or 100 if that is smaller than 1."""
         return abs(self.limit) if abs(self.limit) >= 1.0 else 100.0
+
+
+# Statistics of a run none of which is greater than the next one, and least and greatest values of
+# those that have some.
+_ASCENDING = (
+    ("min_N", "mean_N", "max_N"),
+    ("stat_min_N", "mean_N", "stat_max_N"),
+    ("min_dropper_force_N", "max_dropper_force_N"),
+)
+_POSSIBLE = {
+    **dict.fromkeys(("std_N", "std_0_5_N", "std_5_20_N", "n_slackened"), (0.0, np.inf)),
+    "loss_percent": (0.0, 100.0),
+}
+
+
+def refuse_contradictions(
+    bounds: Sequence[BoundTable], name: str, are_shares: bool = False
+) -> None:
+    """Raise ValueError if no run can keep all ``bounds``, which are called ``name`` in the task.
+
+    ``are_shares`` says that they bound shares of a run's own values, in place of values.
+    """
+    of_whom = " of the value as shipped" if are_shares else ""
+    for one in bounds:
+        least, most = _POSSIBLE.get(one.statistic, (-np.inf, np.inf))
+        if are_shares:
+            most = np.inf
+        if one.limit < least if one.at_least is None else one.limit > most:
+            raise ValueError(
+                f"must have {name} that a run can keep, but has {one.text}{of_whom}: "
+                f"{one.statistic} is {least:g}"
+                + (" at least" if one.at_least is None else f" to {most:g}")
+            )
+    lower = [one for one in bounds if one.at_least is not None]
+    upper = [one for one in bounds if one.at_least is None]
+    for least_one, most_one in itertools.product(lower, upper):
+        pair = least_one.statistic, most_one.statistic
+        ordered = not are_shares and any(
+            pair in itertools.combinations(names, 2) for names in _ASCENDING
+        )
+        if (pair[0] == pair[1] or ordered) and least_one.limit > most_one.limit:
+            raise ValueError(
+                f"must have {name} that a run can keep together, but {least_one.text} and "
+                f"{most_one.text}{of_whom} contradict each other"
+            )
 
 
 class ErrorSamples(Table):

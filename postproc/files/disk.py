@@ -17,10 +17,10 @@ import h5py
 import numpy as np
 
 from catenary.base.errors import RunBroken
+from catenary.base.whole_files import appears_whole
 from catenary.postproc.files.disk_errors import code_of, reason, remedy
 from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
 from catenary.postproc.files.hdf5.self_contained import open_own
-from catenary.postproc.files.own_files import new_part
 
 # Errors of flock on a file system without locks.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
@@ -252,22 +252,6 @@ def broken_write(path: Path, time: float, error: Exception, begun: bool = True) 
     return RunBroken(
         f"writing {path} failed at t = {time:.3f} s ({reason(error)}): {remedy(error)}; {kept}"
     )
-
-
-@contextlib.contextmanager
-def appears_whole(path: Path) -> Iterator[Path]:
-    """Another name for ``path`` while it is made, which takes its own when it is whole.
-
-    A context manager. If something fails there is nothing new.
-    """
-    partial = new_part(path)
-    try:
-        yield partial
-        os.replace(partial, path)
-    except BaseException:
-        with contextlib.suppress(OSError):  # where nothing can be written the first error tells why
-            partial.unlink(missing_ok=True)
-        raise
 
 
 def write_whole(path: Path, content: bytes | str) -> None:

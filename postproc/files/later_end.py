@@ -13,8 +13,9 @@ from pathlib import Path
 import h5py
 
 from catenary.base.errors import RunBroken
+from catenary.base.whole_files import appears_whole
 from catenary.postproc.channels.header import Header
-from catenary.postproc.files.disk import MARGIN, appears_whole, as_attribute, opened, reserve
+from catenary.postproc.files.disk import MARGIN, as_attribute, opened, reserve
 from catenary.postproc.files.disk_errors import reason
 from catenary.postproc.files.hdf5.checked import (
     ATTRIBUTE_SUMS,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
 import re
 import time
 from collections.abc import Iterable
@@ -58,22 +57,9 @@ MP4, GIF = "film.mp4", "film.gif"
 VARIANT_FILE = "variant.json"
 OWN_FILES = (RUN_FILE, *FIELD_FILES, *REPORT_FILES, MP4, GIF, VARIANT_FILE)
 
-_PART = re.compile(r"\.(?P<name>.+)\.\d+\.part")
+_PART = re.compile(r"\.(.+)\.(\d{1,9})\.part")
 # A report may be written beside a run; its files are made in less [s].
 _MAKING = 600.0
-
-
-def part_of(path: Path, process: int) -> Path:
-    """Name under which a process makes a file that is to appear whole."""
-    return path.with_name(f".{path.name}.{process}.part")
-
-
-def new_part(path: Path) -> Path:
-    """The name for this process, free to be written: a file of a dead process with the same number,
-    or a link, is removed."""
-    part = part_of(path, os.getpid())
-    part.unlink(missing_ok=True)
-    return part
 
 
 def remove_stale(folder: Path, names: Iterable[str] = OWN_FILES[1:]) -> None:
@@ -97,12 +83,18 @@ def remove_stale(folder: Path, names: Iterable[str] = OWN_FILES[1:]) -> None:
 
 def remove_parts(folder: Path) -> None:
     """Remove parts of files that dead runs left. Only who holds the folder's lock may."""
-    with contextlib.suppress(OSError):
-        for path in folder.iterdir():
-            part = _PART.fullmatch(path.name)
-            if part is None or part["name"] not in OWN_FILES:
-                continue
-            with contextlib.suppress(OSError):
-                old = time.time() - path.lstat().st_mtime > _MAKING
-                if old or part["name"] in (RUN_FILE, *FIELD_FILES):
-                    path.unlink()
+    for path, name, _ in parts_in(folder):
+        with contextlib.suppress(OSError):
+            old = time.time() - path.lstat().st_mtime > _MAKING
+            if name in OWN_FILES and (old or name in (RUN_FILE, *FIELD_FILES)):
+                path.unlink()
+
+
+def parts_in(folder: Path) -> list[tuple[Path, str, int]]:
+    """Parts of files in a folder, each with the file's name and the number of its process; none if
+    the folder cannot be read."""
+    try:
+        found = [(path, _PART.fullmatch(path.name)) for path in folder.iterdir()]
+    except OSError:
+        return []
+    return [(path, part[1], int(part[2])) for path, part in found if part is not None]

@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.base.whole_files import new_part
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
 from catenary.postproc.files import dimensions
@@ -51,7 +52,6 @@ from catenary.postproc.files.hdf5.table_rows import (
     write_window,
 )
 from catenary.postproc.files.kept_extremes import extremes_at, store_extremes
-from catenary.postproc.files.own_files import new_part
 from catenary.postproc.files.run_schema import (
     COMPLETE,
     FORMAT,

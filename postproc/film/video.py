@@ -13,7 +13,8 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from catenary.postproc.files.disk import appears_whole, unwritten
+from catenary.base.whole_files import appears_whole
+from catenary.postproc.files.disk import unwritten
 
 # A GIF has pictures of this width [px], and so many a second at most.
 _GIF_WIDTH, _GIF_RATE = 800, 12.5

@@ -187,9 +187,10 @@ class StudyTable:
                 rows.append([first, _outcome(row), *[""] * (len(people) - 2)])
         return rows
 
-    def text(self) -> str:
-        """The table for a terminal: in one piece, or in pieces that its width holds."""
-        people, width = self.for_people, terminal_width()
+    def text(self, *, whole: bool = False) -> str:
+        """The table for a terminal, in pieces that its width holds; ``whole``, as in a file or a
+        pipe, it is the same everywhere."""
+        people, width = self.for_people, None if whole else terminal_width()
         columns: list[list[str]] = [[] for _ in people]
         behind = []
         for row, cells in zip(self.rows, self.texts("-"), strict=True):

@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.options import option
+from catenary.base.whole_files import appears_whole
 from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.interface import Pantograph
@@ -86,19 +86,12 @@ def write_line(march: March, path: Path, most_speed: float) -> int:
     )
     pantographs.move_to(first * dt)
     # An earlier file stays until this one is whole. A device takes what is written as it comes.
-    made_as = path
-    if path.is_file() or not path.exists():
-        made_as = path.with_name(f".{path.name}.{os.getpid()}.part")
+    is_device = path.exists() and not path.is_file()
     try:
-        CompiledSteps(scheme, showing, dt, shows=False).steps().write(str(made_as), ahead)
-        if made_as != path:
-            made_as.replace(path)
+        with nullcontext(path) if is_device else appears_whole(path) as made_as:
+            CompiledSteps(scheme, showing, dt, shows=False).steps().write(str(made_as), ahead)
     except (OSError, RuntimeError) as error:
         raise RunBroken(f"{path}: {error}: free some space or choose another file") from error
-    finally:
-        if made_as != path:
-            with contextlib.suppress(OSError):
-                made_as.unlink(missing_ok=True)
     return last - first
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 import shutil
@@ -509,6 +510,26 @@ def test_a_validation_takes_a_comparison_as_its_line_test(
     (tmp_path / "measurement.json").write_text("{}")
     with pytest.raises(InputError, match="is no record of `catenary compare RUN measured.csv`"):
         line_test(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["m.csv.gz", "m.txt", "m"])
+def test_a_measurement_of_another_kind_is_no_damaged_run(
+    run: Path, table: pd.DataFrame, tmp_path: Path, name: str
+) -> None:
+    """The sentence was about HDF5."""
+    file = tmp_path / name
+    table.to_csv(file, index=False)  # what ends in .gz is compressed
+    for words in ([str(run), str(file)], [str(file), str(run)]):
+        done = invoke(*words)
+        assert done.exit_code == 2 and f"{file} is neither a run nor a meas" in done.stderr
+    packed = tmp_path / "m.csv"
+    for content, says in (
+        (gzip.compress(b"place_m,force_N"), "is compressed with gzip: unpack it"),
+        (b"PK\x03\x04", "is a workbook of a spreadsheet or a ZIP archive: export it as CSV"),
+    ):
+        packed.write_bytes(content)
+        done = invoke(str(run), str(packed))
+        assert done.exit_code == 2 and says in done.stderr
 
 
 @pytest.mark.process

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ import catenary
 from catenary import InputError
 from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.scene.line.line_data import span_lengths
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies import scene_sets
 from catenary.cases.studies.optimise import output, study
@@ -331,6 +334,10 @@ def test_bounds_of_values_are_bounds_of_changes() -> None:
             {"key": "train.speed_km_h", "change": [-4.0, 5.0], "round_to": 6.0},
             "round_to is 6, but train.speed_km_h may change by 5 at most",
         ),
+        (
+            {"key": "train.speed_km_h", "change": [-4.0, 5.0], "step": 4.6},
+            "step is 4.6, but the bounds of train.speed_km_h are 9 apart",
+        ),
     ],
 )
 def test_variables_that_a_case_has_not_are_refused(table: dict[str, Any], says: str) -> None:
@@ -393,6 +400,57 @@ def test_a_task_that_is_none_is_refused(tables: dict[str, Any], says: str) -> No
         task_of(**tables)
 
 
+@pytest.mark.parametrize(
+    ("bounds", "says"),
+    [
+        ([("min_N", 60.0, None), ("min_N", None, 50.0)], "min_N >= 60 and min_N <= 50 contradict"),
+        ([("max_N", None, 80.0), ("min_N", 90.0, None)], "min_N >= 90 and max_N <= 80 contradict"),
+        ([("std_N", None, -1.0)], "but has std_N <= -1: std_N is 0 at least"),
+        ([("loss_percent", 101.0, None)], "but has loss_percent >= 101: loss_percent is 0 to 100"),
+        (
+            [("std_N", 1.1, None, "each"), ("std_N", None, 0.9, "each")],
+            "std_N >= 1.1 and std_N <= 0.9 of the value as shipped contradict each other",
+        ),
+        ([("min_N", 60.0, None), ("min_N", None, 60.0), ("max_N", None, 80.0)], None),
+        # The worst one at a speed may get better and others worse; shares are no newtons.
+        ([("std_N", 1.1, None, "each"), ("std_N", None, 0.9, "speed")], None),
+        ([("min_N", 1.2, None, "each"), ("max_N", None, 0.9, "each")], None),
+        ([("loss_percent", None, 101.0, "each")], None),
+    ],
+)
+def test_constraints_that_contradict_each_other_are_refused(
+    bounds: list[tuple[Any, ...]], says: str | None
+) -> None:
+    """A search made all its runs for them and said that no point keeps them."""
+    names = ("statistic", "at_least", "at_most", "of_shipped")
+    tables = [
+        {name: value for name, value in zip(names, one, strict=False) if value is not None}
+        for one in bounds
+    ]
+    if says is None:
+        task_of(constraints=tables)
+        return
+    with pytest.raises(InputError, match=re.escape(says)) as told:
+        task_of(constraints=tables)
+    assert str(told.value).startswith("the table of the task must have constraints that a run can")
+    if "shipped" not in says:
+        errors = [{"name": "a", "kind": "dropper_lengths", "level": 1.0, "most": 2.0}]
+        with pytest.raises(InputError, match=f"criteria that .*{re.escape(says)}"):
+            read_task({"errors": errors, "criteria": tables}, ToleranceTask)
+
+
+def test_directions_of_a_symmetric_line_are_one_run_in_its_middle(evaluated: Any) -> None:
+    """Another evaluated stretch has another run-in from the other end: both ways are run."""
+    variables = [{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}]
+    middle = 0.5 * float(np.sum(span_lengths(draft().scene().line)))
+    for behind, n_runs in ((60.0, 1), (0.0, 2)):
+        own = draft(**{"evaluation.from_m": middle - 60.0, "evaluation.to_m": middle + behind})
+        evaluated(lambda scene: summary(20.0))
+        task = task_of(variables=variables, search={"most_runs": 1})
+        (found,) = study.optimise(study.make_plan(own, task))
+        assert found.n_runs == n_runs
+
+
 # --- droppers ------------------------------------------------------------------------------------
 
 
@@ -409,6 +467,23 @@ def test_an_installer_reads_lengths_and_changes() -> None:
     assert [row["dropper"] for row in table.rows[:10]] == [*range(1, 10), 1]
     assert all(row["moved_mm"] == 0.0 for row in table.rows)
     assert max(abs(row["change_mm"]) for row in table.rows) > 1.0
+
+
+def test_droppers_that_stay_as_they_are_have_no_table(evaluated: Any) -> None:
+    """A tension that stretches them by a thousandth of a millimetre printed a table of zeros."""
+    task = task_of(
+        variables=[{"key": "line.contact_wire.tension_N", "change": [-50.0, 50.0]}],
+        search={"most_runs": 4},
+    )
+    evaluated(lambda scene: summary(20.0 - 1e-3 * scene.line.contact_wire.tension_N))
+    said: list[str] = []
+    plan = study.make_plan(draft(), task)
+    (found,) = study.optimise(plan, say=said.append)
+    assert found.found.change.any() and said[0] == "gradient: 1 variable, 2 scenes"
+    assert [table.title for table in output.tables_of(plan, found)] == ["Variables", "Checks"]
+    moved = [row | {"change_mm": 0.06} for row in found.droppers.rows]
+    shifted = replace(found, droppers=replace(found.droppers, rows=moved))
+    assert "Lengths of droppers" in output.tables_of(plan, shifted)[1].title
 
 
 def test_droppers_keep_a_force_at_rest() -> None:

@@ -30,6 +30,7 @@ from catenary.cases.studies.effect_cost.study import (
     measure,
     switchable_effects,
 )
+from catenary.postproc.report import study_table
 from catenary.postproc.report.study_table import write_files
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
@@ -208,6 +209,17 @@ def test_table_csv_and_json_hold_the_same(found: Costs, tmp_path: Path) -> None:
         for remark in remarks:
             (line,) = [line for line in text.splitlines() if line.endswith(f": {remark}")]
             assert line.startswith("REMARK      ") and name in line
+
+
+def test_the_text_of_a_file_does_not_depend_on_the_terminal(
+    found: Costs, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its table was cut to pieces as wide as the terminal of who wrote it."""
+    before = output.files_of(found)[output.TEXT]
+    assert before == output.as_text(found) + "\n"
+    monkeypatch.setattr(study_table, "terminal_width", lambda: 60)
+    assert output.files_of(found)[output.TEXT] == before
+    assert output.as_text(found) + "\n" != before
 
 
 def test_an_effect_that_a_scene_refuses_to_leave_out_is_told() -> None:

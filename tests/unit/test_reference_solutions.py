@@ -200,7 +200,45 @@ def test_unfiltered_forces_are_filtered(tmp_path: Path) -> None:
     # What is filtered twice loses at most half of what is near 20 Hz.
     assert found.figures["pantograph", HISTORY] < 0.1 * solution.figures["pantograph", "std_N"][0]
     assert found.figures["pantograph", "loss_percent"] == 0.0
-    assert "goes on only 0.0 m beyond the stretch" in found.remarks[0]
+    (remark,) = found.remarks
+    assert "goes on only 0.0 m beyond the stretch" in remark
+
+
+def rippled(path: Path, spacing: float) -> None:
+    """The shipped force and 20 N at 66 Hz, which samples every metre, 76 a second, show as 10."""
+    solution = read(ONE)
+    train = problem_of(solution.configuration.scene()).train
+    start, end = solution.stretch
+    place = np.arange(start - 30.0, end + 30.0, spacing)
+    force = np.interp(place, solution.place, solution.forces["pantograph"])
+    force += 20.0 * np.sin(2 * np.pi * 66.0 * place / train.speed)
+    pd.DataFrame({PLACE: place, "pantograph_N": force}).to_csv(path, index=False)
+
+
+def test_rare_samples_of_unfiltered_forces_are_told(tmp_path: Path) -> None:
+    """By its frequency of samples a ripple above the filter becomes one below it."""
+    path, off = tmp_path / "raw.csv", {}
+    for spacing in (0.25, 1.0):
+        rippled(path, spacing)
+        (found,) = read_results([path], ONE, is_filtered=False)
+        off[spacing] = found.figures["pantograph", HISTORY]
+        told = [text for text in found.remarks if "has a sample every" in text]
+        assert len(told) == (spacing == 1.0), found.remarks
+    assert "every 1 m, 76.4 a second" in told[0] and "faster than 56.4 Hz" in told[0]
+    # The whole ripple, beside half of what is near 20 Hz.
+    assert off[1.0] > 0.9 * 20.0 / np.sqrt(2) and off[0.25] < 4.0
+
+
+@pytest.mark.parametrize("spacing", [0.25, 1.0])
+def test_forces_that_passed_no_filter_are_told(tmp_path: Path, spacing: float) -> None:
+    rippled(tmp_path / "raw.csv", 0.25)
+    (found,) = read_results([tmp_path / "raw.csv"], ONE, is_filtered=True)
+    (remark,) = found.remarks
+    assert "N above 32 Hz" in remark and remark.endswith("takes --unfiltered.")
+    filtered = pd.read_csv(DATA / f"{ONE}.csv")[:: round(spacing / 0.25)]
+    filtered.to_csv(tmp_path / "filtered.csv", index=False)
+    (found,) = read_results([tmp_path / "filtered.csv"], ONE, is_filtered=True)
+    assert not found.remarks
 
 
 @pytest.mark.study
@@ -254,6 +292,11 @@ def stretch(force: str) -> str:
             'has no number in column "pantograph_N", row 2 below',
         ),
         (rows(1.0).replace("\n2,2", "\n2,nan"), ONE, "needs a finite number"),
+        (
+            rows(1.0).replace("\n2,2", '\n"2,5",2'),
+            ONE,
+            'has "2,5" in column "place_m", row 2 below its names; write decimal points',
+        ),
         ("of,quantity\nline,max_uplift_mm\n", ONE, 'has no column "value"'),
         ("of,quantity,value\nline,max_uplift_mm,nan\n", ONE, 'no number in column "value", row 1'),
         ("of,quantity,value\nline,max_uplift_mm,0.07\n", ONE, "gives 0.07 for max_uplift_mm"),

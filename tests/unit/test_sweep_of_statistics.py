@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -87,6 +88,8 @@ def test_nothing_but_tables_is_left_and_the_same_call_goes_on(
 ) -> None:
     first = catenary.sweep(scene, VARY, tmp_path, only_statistics=True)
     same(first, table)
+    # They were zero; those that march side by side share the time of their piece of work.
+    assert (first.wall_s > 0.0).all() and first.wall_s.nunique() == 2
     assert not list(tmp_path.rglob("run.h5")) and (tmp_path / "sweep.csv").is_file()
     records = sorted((tmp_path / FOLDER).iterdir())
     assert len(records) == 2  # pieces of four variants
@@ -96,7 +99,8 @@ def test_nothing_but_tables_is_left_and_the_same_call_goes_on(
     kept = json.loads(records[1].read_text())
     kept_time = records[1].stat().st_mtime_ns
     same(catenary.sweep(scene, VARY, tmp_path, only_statistics=True), table)
-    assert json.loads(records[0].read_text()) == json.loads(text)
+    again, before = (json.loads(one)["rows"] for one in (records[0].read_text(), text))
+    assert [row[:-1] for row in again] == [row[:-1] for row in before]  # wall times differ
     assert json.loads(records[1].read_text()) == kept
     assert records[1].stat().st_mtime_ns == kept_time
 
@@ -218,6 +222,22 @@ def test_the_same_call_completes_histories(
     assert joined.stat().st_mtime_ns != made
     for name, table in whole.items():
         np.testing.assert_array_equal(again[name], table)
+
+
+@pytest.mark.process
+def test_parts_of_killed_processes_are_removed(scene: catenary.Scene, tmp_path: Path) -> None:
+    """A killed sweep left hidden parts of histories for ever, beside those of processes at work."""
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    kept = tmp_path / FOLDER
+    kept.mkdir()
+    gone = [tmp_path / f".histories.h5.{dead.pid}.part"]
+    gone += [kept / f".{64 * 'a'}.{kind}.{dead.pid}.part" for kind in ("h5", "json")]
+    stay = [kept / f".{64 * 'a'}.h5.{os.getpid()}.part", tmp_path / f".notes.{dead.pid}.part"]
+    for path in (*gone, *stay):
+        path.touch()
+    histories(scene, tmp_path)
+    assert not any(path.exists() for path in gone) and all(path.exists() for path in stay)
 
 
 def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) -> None:

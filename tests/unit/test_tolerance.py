@@ -505,7 +505,7 @@ def test_an_installer_reads_which_criteria_nothing_helps_and_which_nothing_loses
         ([{**SPEED, "key": "pantographs.reference.masses_kg"}], "errors.0.entry names one"),
         ([{**SPEED, "level": -1.0}], "^errors.0.level is -1.0 in"),
         ([{**SPEED, "levle": 1.0}], "errors.0.levle in .* did you mean errors.0.level"),
-        ([{**SPEED, "level": 50.0}], "at most most, 40"),
+        ([{**SPEED, "level": 50.0}], "level is 50 km/h, above its most, 40 km/h"),
         ([{**SPEED, "most": 5000.0}], "train.speed_km_h is 5250"),
         ([{**TENSION, "wires": ["wire"]}], "the line has contact_wire, messenger_wire"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -95,9 +96,18 @@ def test_impossible_products_are_told(texts: list[str], sentence: str) -> None:
 @given(st.text(max_size=300))
 def test_every_text_makes_a_folder_name(text: str) -> None:
     name = slug(text)
-    assert 0 < len(name) <= 100
-    assert set(name) <= set("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-")
-    assert name not in (".", "..")
+    assert 0 < len(name.encode()) <= 100
+    assert all(one in "._-" or unicodedata.category(one)[0] in "LMN" for one in name)
+    assert name not in (".", "..") and slug(name) == name
+
+
+def test_names_keep_letters_of_all_scripts() -> None:
+    """They kept those of English: variants "Stütz" and "Stätz" were "St-tz" and "St-tz-2"."""
+    table = {"Stützpunkt": [], "Stätz": [], "пролёт": [], "スパン": [], "अवधि": []}
+    assert [one.name for one in product([], table)] == list(table)
+    assert slug("u\N{COMBINING DIAERESIS}ber 5 °C, \u202eλ/2") == "über-5-C-λ-2"
+    (cut,) = product([], {200 * "я": []})
+    assert cut.name.startswith(45 * "я" + "-")
 
 
 def test_long_names_that_differ_at_their_end_stay_apart() -> None:

@@ -241,6 +241,18 @@ def test_the_pantograph_ahead_is_told_where_it_is_better() -> None:
     assert not list(causes._pantograph_ahead(alike)) and not list(causes._pantograph_ahead(leading))
 
 
+def test_candidates_are_explained_where_there_are_some(
+    run_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The sentence about candidates stood below places without any."""
+    with Results(run_folder) as results:
+        assert worst_output.answer_of(results, 3)[0].endswith("none is proved.")
+        for name in ("of_line", "of_passage", "at"):
+            monkeypatch.setattr(Causes, name, lambda *_: [])
+        text, _ = worst_output.answer_of(results, 3)
+    assert "Spans by standard deviation" in text and "none is proved" not in text
+
+
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     for folder in (tmp_path / "nowhere", tmp_path):
         done = verb_runner.invoke("worst", str(folder))

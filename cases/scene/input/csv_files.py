@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import difflib
 import math
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,9 @@ from catenary.cases.scene.input.toml_input import read_toml
 from catenary.postproc.standards.book import book_of
 
 _LONGEST_NAME = 1000
+_QUOTED_COMMA = re.compile(r'"[^",]*,[^"]*"')
+# Of a number in a table whose columns stand between commas.
+DECIMAL_COMMAS = "write decimal points, or semicolons or tabs between columns"
 # A line whose largest pre-sag is smaller has none: such a table was written in metres [mm].
 LEAST_PRE_SAG = 0.2
 
@@ -305,10 +309,12 @@ def _rows(path: Path, where: str, columns: dict[str, bool]) -> list[tuple[int, d
             values = [float(cell) for cell in cells]
         except ValueError:
             values = []
-        if len(values) != len(named) or not all(map(math.isfinite, values)):
+        quoted = separator == "," and _QUOTED_COMMA.search(line) is not None
+        if quoted or len(values) != len(named) or not all(map(math.isfinite, values)):
+            more = quoted or (separator == "," and len(cells) > len(named))
             raise InputError(
                 f"{where}; its line {number} must hold a number for each of {', '.join(named)}, "
-                f"and is {shown(line)}"
+                f"and is {shown(line)}" + (f": {DECIMAL_COMMAS}" if more else "")
             )
         rows.append((number, dict(zip(named, values, strict=True))))
     if not rows:
@@ -355,6 +361,7 @@ def _pairs(path: Path, where: str, raw: dict[str, Any]) -> list[list[float]]:
         elif pairs or named:
             raise InputError(
                 f"{where}; its line {number} must hold two numbers and a comma between"
+                + (", each with a decimal point" if len(line) > 2 else "")
             )
         else:
             named = True

@@ -13,6 +13,11 @@ from catenary.base.errors import InputError
 MOST_BYTES = 10_000_000  # an input file is written by hand or is a table; more is some other file
 DEEPEST = 32  # tables in tables; the schema has no more than eight
 _BOM = b"\xef\xbb\xbf"
+# First bytes of files in place of which people have a text to give.
+_PACKED = {
+    b"\x1f\x8b": "compressed with gzip: unpack it",
+    b"PK\x03\x04": "a workbook of a spreadsheet or a ZIP archive: export it as CSV, or unpack it",
+}
 # What steers a terminal, a spreadsheet or the direction of reading: control characters, invisible
 # formats (bidirectional overrides among them), separators of lines, halves of pairs, private use.
 _STEERS = ("Cc", "Cf", "Zl", "Zp", "Cs", "Co")
@@ -61,6 +66,9 @@ def decode(content: bytes, name: str) -> str:
     for mark in (b"\xff\xfe", b"\xfe\xff"):
         if content.startswith(mark):
             raise InputError(f"{name} is a text file in UTF-16; save it in UTF-8")
+    for mark, kind in _PACKED.items():
+        if content.startswith(mark):
+            raise InputError(f"{name} is {kind}")
     try:
         return content.removeprefix(_BOM).decode("utf-8")
     except UnicodeDecodeError as error:

@@ -116,8 +116,9 @@ def width_text(size: Size) -> str:
     return f"{low}" if low == high else f"{low} to {high}"
 
 
-def as_text(found: Costs) -> str:
-    """The table: switched against as it is, then advice, then what is not measured."""
+def as_text(found: Costs, *, whole: bool = False) -> str:
+    """The table: switched against as it is, then advice, then what is not measured; ``whole``, for
+    a file, whatever the width of the terminal."""
     (start, end), rounds = found.stretch, found.options.rounds
     table = table_of(found)
     mine = ("", found.names[0])
@@ -130,7 +131,7 @@ def as_text(found: Costs) -> str:
     ]
     if len(found.names) > 1:
         lines.append(f"Forces are those of {found.names[0]}, which leads.")
-    lines += ["", leading.text(), "", "Advice:"]
+    lines += ["", leading.text(whole=whole), "", "Advice:"]
     width = max(len(row.switch.name) for row in found.rows) if found.rows else 0
     lines += [f"  {row.switch.name:{width}}  {sentence(found, row)}" for row in found.rows]
     remarks = remark_lines((_run(one), one.remarks) for one in (found.as_it_is, *found.rows))
@@ -235,4 +236,8 @@ def record_of(found: Costs) -> dict[str, Any]:
 
 def files_of(found: Costs) -> dict[str, Content]:
     """Table, record and text. Not collective."""
-    return {TABLE: table_of(found), RECORD: record_of(found), TEXT: as_text(found) + "\n"}
+    return {
+        TABLE: table_of(found),
+        RECORD: record_of(found),
+        TEXT: as_text(found, whole=True) + "\n",
+    }

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.csv_files import DECIMAL_COMMAS
 from catenary.cases.scene.input.plain_text import plain, read_text
 from catenary.cases.studies.measured.description import (
     Description,
@@ -54,7 +55,7 @@ def read_table(path: Path) -> pd.DataFrame:
     if not isinstance(table.index, pd.RangeIndex):  # pandas takes the values in excess as names
         raise InputError(
             f"{path} has more values in a row than the names of columns, {columns_in(table)}: "
-            "decimal commas need semicolons or tabs between columns"
+            f"{DECIMAL_COMMAS}"
         )
     return table
 
@@ -86,9 +87,12 @@ def column_of(table: pd.DataFrame, path: str, name: str, may_lack: bool = False)
     if wrong.size and not may_lack:
         cell = table[name].iloc[wrong[0]]
         has = "no number" if pd.isna(cell) else f'"{plain(str(cell), 40)}"'
+        needs = "each row needs a finite number there"
+        if "," in str(cell):  # where semicolons or tabs stand between columns there is none left
+            needs = DECIMAL_COMMAS
         raise InputError(
             f'{path} has {has} in column "{plain(name, 100)}", row {wrong[0] + 1} below its names; '
-            "each row needs a finite number there"
+            f"{needs}"
         )
     values[wrong] = np.nan
     return np.asarray(values)

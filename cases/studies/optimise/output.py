@@ -184,8 +184,9 @@ def sentence(one: Optimum, plan: Plan) -> str:
 def tables_of(plan: Plan, one: Optimum) -> list[StudyTable]:
     """The tables that people read: variables, droppers of one span, checks in short."""
     tables = [variables_table(plan, one)]
+    # In tenths of a millimetre, which people read.
     rows = one.droppers.rows
-    if any(abs(row["change_mm"]) > 1e-6 or abs(row["moved_mm"]) > 1e-6 for row in rows):
+    if any(max(abs(row["change_mm"]), abs(row["moved_mm"])) >= 0.05 for row in rows):
         tables.append(of_middle_span(one.droppers))
     return [*tables, checks_in_short(one.rows)]
 

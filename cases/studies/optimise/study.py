@@ -222,7 +222,8 @@ def optimise(
 
 def _by(method: str, plan: Plan, evaluation: Evaluation, say: Callable[[str], None]) -> Optimum:
     task, variables = plan.task, plan.variables
-    say(f"{method}: {variables.low.size} variables, {len(plan.scenes.members)} scenes")
+    n_variables = counted(variables.low.size, "variable")
+    say(f"{method}: {n_variables}, {counted(len(plan.scenes.members), 'scene')}")
     first = evaluation.n_runs
     problem = Problem(
         plan.scenes,

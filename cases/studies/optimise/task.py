@@ -14,7 +14,12 @@ from pydantic import (
 
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Seed
-from catenary.cases.studies.scene_sets import BoundTable, SetTable, Statistic
+from catenary.cases.studies.scene_sets import (
+    BoundTable,
+    SetTable,
+    Statistic,
+    refuse_contradictions,
+)
 
 GRADIENT, CMA = "gradient", "cma"
 Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -158,4 +163,11 @@ class OptimiseTask(Table):
                     f"must have the speeds of its objective in set.speeds_km_h, which has no "
                     f"{speed:g}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_kept(self) -> OptimiseTask:
+        for kind in (None, "each", "speed"):
+            own = [one for one in self.constraints if one.of_shipped == kind]
+            refuse_contradictions(own, "constraints", are_shares=kind is not None)
         return self

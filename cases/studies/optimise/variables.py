@@ -185,4 +185,9 @@ def _component(
             f"{max(-low, high):g} at most, so that 0 is its only multiple left"
         )
     step = table.step or _USUAL_STEP * (high - low)
+    if step > 0.5 * (high - low):  # so that one fits, up or down, wherever a search is
+        raise InputError(
+            f"variables.{number}.step is {step:g}, but the bounds of {table.key} are "
+            f"{high - low:g} apart: it may be half of that at most"
+        )
     return Component(table.key, entries, signs, low, high, step, table.round_to or 0.0)

@@ -40,7 +40,9 @@ def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:
             f"The record ends with the last pantograph at {places.passed_to:.0f} m: supports and "
             "droppers beyond are left out."
         )
+    named = False
     for (noun, by), found in worst_of_each(places, causes, names, count).items():
+        named = named or any(candidates not in ([], [NONE]) for _, candidates in found)
         lines += ["", f"{noun.capitalize()}s by {by}"]
         for sentence, candidates in found:
             more = len(candidates) - _MOST_CAUSES
@@ -51,7 +53,9 @@ def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:
         lines += ["", "Of the line as a whole:", *(f"  {text}" for text in everywhere)]
     if unknown:
         lines += ["", f"Elasticity and gusts along the line are not known: {unknown}"]
-    text = "\n".join([*lines, "", "Candidates are near in place or frequency; none is proved."])
+    if named or everywhere:
+        lines += ["", "Candidates are near in place or frequency; none is proved."]
+    text = "\n".join(lines)
     of_span = ("std_N", "max_N", "min_N", "loss_percent", "median_std_N", "stands_out")
     spans = file_table(
         ("span", "from_m", "to_m", "pantograph", *of_span, "causes"),

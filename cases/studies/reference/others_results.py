@@ -35,6 +35,12 @@ _QUANTITY, _VALUE, _OF, _CONFIGURATION = "quantity", "value", "of", "configurati
 _FINE = 0.02
 # A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
 _SETTLED = 6.0
+# EN 50317 samples forces, before they are filtered, more often in a second or in less than [m].
+_RATE, _SPACING = 200.0, 0.4
+# The filter of EN 50317 leaves 6 % of what is at so many of its cut-offs, and less beyond. Forces
+# that have more than this part of their deviation there have not passed it: filtered ones of the
+# reference models have at most 0.006, unfiltered ones 0.2.
+_STOPPED, _PASSED_BY = 1.6, 0.1
 _FROM_STATISTICS = {
     "mean_N": "mean", "std_N": "std", "std_0_5_N": "std_0_5", "std_5_20_N": "std_5_20",
     "stat_max_N": "stat_max", "stat_min_N": "stat_min", "max_N": "maximum", "min_N": "minimum",
@@ -168,6 +174,7 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
                 f"is evaluated from {start:g} to {end:g} m"
             )
         if is_filtered:
+            _remark_on_filter(one, of, force, dt)
             curve = curve_through(place, force)
             fine = curve(np.linspace(start, end, 1 + round((end - start) / _FINE)))
             mean, std = float(fine.mean()), float(fine.std())
@@ -177,6 +184,7 @@ def _add_forces(one: Others, table: pd.DataFrame, name: str, is_filtered: bool) 
                 "stat_min_N": mean - 3 * std,
             }  # fmt: skip
         else:
+            _remark_on_samples(one, of, place[1] - place[0], dt)
             _remark_on_ends(one, of, place, dt)
             found = contact_statistics(of, place, force, np.zeros_like(force), dt, solution.stretch)
             own = {key: getattr(found, word) for key, word in _FROM_STATISTICS.items()}
@@ -223,6 +231,31 @@ def _places_of(one: Others, of: str, table: pd.DataFrame, name: str) -> tuple[np
             f"{filters.CUT_OFF:g} Hz takes more than {2 * filters.CUT_OFF:g}"
         )
     return place, dt
+
+
+def _remark_on_filter(one: Others, of: str, force: np.ndarray, dt: float) -> None:
+    """Tell if a force that is said to be filtered is not; samples may be too rare to see it."""
+    cut_off = _STOPPED * filters.CUT_OFF
+    if 2.0 * cut_off * dt >= 1.0:
+        return
+    beyond = float(np.std(force - filters.low_pass(force, dt, cut_off)))
+    if beyond > _PASSED_BY * float(np.std(force)):
+        one.remarks.append(
+            f"{of}_N has a standard deviation of {beyond:.1f} N above {cut_off:g} Hz, where the "
+            f"{filters.CUT_OFF:g} Hz filter leaves next to nothing: a force that has not passed it "
+            "takes --unfiltered."
+        )
+
+
+def _remark_on_samples(one: Others, of: str, spacing: float, dt: float) -> None:
+    """Tell if samples of an unfiltered force fold what is fast into the band that is judged."""
+    if spacing > _SPACING and 1.0 / dt < _RATE:
+        one.remarks.append(
+            f"{of}_N has a sample every {spacing:.3g} m, {1 / dt:.3g} a second, before the filter: "
+            f"what is faster than {1 / dt - filters.CUT_OFF:.3g} Hz looks as if it were below "
+            f"{filters.CUT_OFF:g} Hz, and figures may be wrong by several newtons. EN 50317 takes "
+            f"more than {_RATE:g} samples a second, or one in less than {_SPACING:g} m."
+        )
 
 
 def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:

@@ -16,11 +16,13 @@ from typing import Any
 import h5py
 import numpy as np
 
+from catenary.base.whole_files import appears_whole
+from catenary.cases.result_folder.output_folder import remove_dead_parts
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import HISTORIES
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.files.dimensions import CONVENTIONS
-from catenary.postproc.files.disk import MARGIN, appears_whole, opened, reserve, unwritten
+from catenary.postproc.files.disk import MARGIN, opened, reserve, unwritten
 from catenary.postproc.files.filtered_force import PATH as FILTERED
 from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
 from catenary.postproc.files.hdf5.self_contained import open_own
@@ -113,6 +115,11 @@ class KeptHistories(KeptRows):
         record = self.path_of(depends_on)
         assert record is not None
         return record.with_suffix(".h5")
+
+    def remove_parts(self) -> None:
+        """As of ``KeptRows``, and those of joined histories."""
+        super().remove_parts()
+        remove_dead_parts(self._path.parent, [FILE])
 
     def join(self, variants: Sequence[Variant], pieces: Mapping[Path, Sequence[Variant]]) -> None:
         """Make one file of those of the pieces; those of a whole sweep go. Not collective.

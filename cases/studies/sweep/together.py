@@ -99,6 +99,8 @@ class Ensemble(NamedTuple):
             folder = None if part is None else part.folder
             kept = histories = KeptHistories(out, self.histories, sweep, options.force, folder)
             files = [histories.file_of(depends_on(piece)) for piece in pieces]
+        if part is None:  # parts of a sweep share a folder, without a lock
+            on_root(comm, kept.remove_parts)
         n_at_once = at_once(options.n_jobs, comm)
         if comm.size > 1:  # a march is one rank's: all without -j would do the same
             n_at_once = comm.size
@@ -223,7 +225,8 @@ class _March:
         self._marches: Any = None
 
     def __call__(self, work: tuple[Sequence[Variant], Path | None], comm: Any) -> list[list[Any]]:
-        """Outcome and what is kept of the summary of each. Not collective.
+        """Of each variant the outcome, what is kept of its summary, no measures, and its share of
+        the wall time [s]. Not collective.
 
         Parameters
         ----------
@@ -241,6 +244,7 @@ class _March:
                 numbers.append(number)
             except InputError as error:
                 rows[number] = [str(error), {}]
+        clock = time.perf_counter()
         if self._marches is None:
             self._marches = Marches()
         with piece_file(file, self._histories) as put:
@@ -249,6 +253,10 @@ class _March:
                 if marched.outcome == DONE:
                     put(number, marched.tables)
                 rows[number] = [marched.outcome, marched.summary()]
+        # They march side by side, so that none has a time of its own.
+        wall = (time.perf_counter() - clock) / max(1, len(numbers))
+        for number in numbers:
+            rows[number] += [{}, wall]
         return rows
 
     def __getstate__(self) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import json
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 MAX_VARIANTS = 10_000
 MOST_LETTERS = 200  # in a variant's name
-_LONGEST_SLUG = 100  # folder names may have 255 bytes; room for what a user puts around them
+_LONGEST_SLUG = 100  # bytes; folder names may have 255 bytes; room for what a user puts around them
 VARY = "on the command line (--vary)"
 _OPENING, _CLOSING, _QUOTES = "[{", "]}", "\"'"
 
@@ -279,15 +280,24 @@ def product(
 
 
 def slug(text: str) -> str:
-    """``text`` as the name of a folder: letters, digits, ``.``, ``_`` and ``-``.
+    """``text`` as the name of a folder: letters and digits of any script, ``.``, ``_`` and ``-``.
 
-    What is too long is cut and marked with a digest of the whole.
+    Letters are those of NFC, in which one with an accent is one character. What is too long is cut
+    and marked with a digest of the whole.
     """
-    name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.") or "variant"
-    if len(name) > _LONGEST_SLUG:
+    text = unicodedata.normalize("NFC", text)
+    kept = "".join(one if one in "._" or _is_of_words(one) else "-" for one in text)
+    name = re.sub("-+", "-", kept).strip("-.") or "variant"
+    if len(name.encode()) > _LONGEST_SLUG:
         mark = hashlib.sha256(text.encode()).hexdigest()[:8]
-        name = f"{name[: _LONGEST_SLUG - 9]}-{mark}"
+        # Cut between two characters, which have several bytes each in other scripts.
+        name = f"{name.encode()[: _LONGEST_SLUG - 9].decode(errors='ignore')}-{mark}"
     return name
+
+
+def _is_of_words(letter: str) -> bool:
+    """Whether a character is a letter, a mark on one (vowels of Indian scripts), or a digit."""
+    return unicodedata.category(letter)[0] in "LMN"
 
 
 def _with_own_folders(variants: list[Variant]) -> list[Variant]:
@@ -297,10 +307,10 @@ def _with_own_folders(variants: list[Variant]) -> list[Variant]:
     for variant in variants:
         name = slug(variant.name)
         number = 2
-        while name.lower() in taken:  # some file systems ignore case
+        while name.casefold() in taken:  # some file systems ignore case
             name = f"{slug(variant.name)}-{number}"
             number += 1
-        taken.add(name.lower())
+        taken.add(name.casefold())
         result.append(replace(variant, name=name))
     return result
 

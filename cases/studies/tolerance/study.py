@@ -227,8 +227,8 @@ def make_plan(draft: Draft, task: ToleranceTask) -> Plan:
         refuse_shared(scenes.members, group.key, f"errors.{number}")
         if group.table.level > group.table.most:
             raise InputError(
-                f"errors {group.table.name}: level is {group.table.level:g} {group.unit}; it must "
-                f"be at most most, {group.table.most:g} {group.unit}"
+                f"errors {group.table.name}: level is {group.table.level:g} {group.unit}, above "
+                f"its most, {group.table.most:g} {group.unit}, the greatest tolerance looked at"
             )
         for sign in (1.0, -1.0):
             largest = group.values(np.full(len(group.names), sign * group.table.most))

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Seed, WireName
-from catenary.cases.studies.scene_sets import BoundTable, SetTable
+from catenary.cases.studies.scene_sets import BoundTable, SetTable, refuse_contradictions
 
 Label = Annotated[str, Field(min_length=1, max_length=100)]
 
@@ -141,4 +141,5 @@ class ToleranceTask(Table):
         names = [one.name for one in self.errors]
         if len(set(names)) < len(names):
             raise ValueError("must give each of the errors a name of its own")
+        refuse_contradictions(self.criteria, "criteria")
         return self

@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
+from catenary.base.whole_files import new_part
 from catenary.postproc.files.disk import (
     MARGIN,
     check_in_place,
@@ -27,7 +28,6 @@ from catenary.postproc.files.disk import (
     write_at,
 )
 from catenary.postproc.files.hdf5.checked import put_array, set_attribute
-from catenary.postproc.files.own_files import new_part
 from catenary.postproc.record.snapshots.blocks import Block
 from catenary.postproc.record.snapshots.field_layout import (
     FORMAT,

@@ -48,7 +48,9 @@ class HeldSimulation : public Simulation {
                 "have to pull, or a mechanism would leave the heights that it can reach");
         if (outcome == Outcome::kTurned)
             throw std::runtime_error(
-                "a wire has turned by more than 1 rad from rest, beyond its linear model");
+                py::str("a wire has turned by more than {:g} rad from rest, beyond its linear "
+                        "model")
+                    .format(simulation.most_turn()));
         return outcome == Outcome::kDone;
     }
     py::bytes saved() const {

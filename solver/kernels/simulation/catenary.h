@@ -33,8 +33,8 @@ enum {
     CATENARY_NOT_FOUND = 1, /* no forces fit it, or a mechanism would leave the heights that it can
                              * reach */
     CATENARY_AT_END = 2,    /* the file has no inputs for a further step */
-    CATENARY_TURNED = 3     /* a wire has turned by more than 1 rad from rest: the line, which is
-                             * linear, has run away */
+    CATENARY_TURNED = 3     /* a wire has turned from rest by more than a linear line bears: it
+                             * has run away */
 };
 
 /* Read a line; NULL if that fails: `error` then holds why, in up to n_error bytes. */

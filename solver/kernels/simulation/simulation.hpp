@@ -79,6 +79,7 @@ class Simulation {
     double way() const { return steps_->way(time()); }  ///< of the train since it started [m]
     double speed() const { return steps_->course().speed; }
     double most_speed() const { return line_.ahead.most_speed; }
+    double most_turn() const { return line_.ahead.most_turn; }
     /// Give the train another speed [m/s], if it can have one; whether it can.
     bool set_speed(double speed);
     std::span<Input> inputs() { return inputs_; }  ///< of each pantograph

@@ -163,6 +163,9 @@ def test_what_is_set_acts_from_the_next_step_on(name: str, scene: catenary.Scene
     [
         (np.nan, "must be finite"),
         ("5 N", 'lift_force is "5 N"; it must be a number or numbers'),
+        ("5", 'lift_force is "5"; it must be a number or numbers'),
+        (["5"], "it must be a number or numbers"),
+        (np.array(["5"], dtype=object), "it must be a number or numbers"),
         (True, "lift_force is true; it must be a number or numbers"),
         ([np.True_], "it must be a number or numbers"),
         ([np.inf], "must be finite"),
@@ -177,7 +180,7 @@ def test_what_cannot_be_set_is_refused(value: Any, says: str, scene: catenary.Sc
 
 def test_speeds_that_cannot_be_are_refused(scene: catenary.Scene) -> None:
     with catenary.Simulation(scene) as sim:
-        for word in ("fast", None, True, np.True_):
+        for word in ("fast", "60", None, True, np.True_):
             with pytest.raises(catenary.InputError, match="speed is .*must be a number"):
                 sim.speed = word  # type: ignore[assignment]
         for speed in (-1.0, np.nan, np.inf):
@@ -262,6 +265,16 @@ def test_a_line_that_runs_away_under_a_controller_says_so(scene: catenary.Scene)
             sim.step()
         sim.restore(state)
         assert sim.step(100)
+
+
+def test_a_controller_that_drives_a_mechanism_down_is_told() -> None:
+    """A run names the heights; steps from outside listed all that might be wrong."""
+    with catenary.Simulation(catenary.load("ambrosio2012", short=True)) as sim:
+        sim.step(50)
+        sim.lift_force = -2000.0
+        says = r": it has head_height \[[\d.]+\], contact_force \[0.0\], lift_force \[-2000.0\]"
+        with pytest.raises(catenary.RunBroken, match=says):
+            sim.step(1000)
 
 
 def test_a_damaged_state_is_refused(scene: catenary.Scene) -> None:
