@@ -266,6 +266,15 @@ class Raising:
             return 1.0
         return float(_half_cosine(time, self.raise_time))
 
+    def rates(self, times: np.ndarray) -> np.ndarray:
+        """Rates of the part at ``times`` (n,) [s], shape (n,) [1/s]."""
+        found = np.zeros(times.size)
+        rising = times < self.raise_time  # never, if it is raised at once
+        if rising.any():
+            turned = np.pi * times[rising] / self.raise_time
+            found[rising] = np.pi / (2.0 * self.raise_time) * np.sin(turned)
+        return found
+
 
 def parts_of(part: Callable[[float], float], times: np.ndarray) -> np.ndarray:
     """The parts of the lift at ``times`` (n,) [s], which grow, shape (n,)."""

@@ -147,7 +147,34 @@ REGULATED: dict[str, Any] = {
     "contact": {"stiffness_N_per_m": 5e4},
     "numerics": {"dt_s": 1e-3, "integrator": "hht", "spectral_radius": 0.8},
 }
-SCENES = {"many laws": MANY_LAWS, "canted": CANTED, "regulated": REGULATED}
+# A chain tied to its base, which rises with a short lift, on springs beside a law with a kink.
+TIED: dict[str, Any] = {
+    "line": LINE,
+    "train": {
+        "speed_km_h": 200.0,
+        "start_m": 55.0,
+        "end_m": 140.0,
+        "raise_time_s": 0.05,
+        "start_below_m": 0.01,
+        "pantographs": [{"name": "a"}],
+    },
+    "pantographs": {
+        "a": CHAIN
+        | {
+            "stiffnesses_N_per_m": [8000.0, 12000.0, 900.0],
+            "dampings_N_s_per_m": [40.0, 10.0, 500.0],
+            "laws": [
+                {
+                    "type": "spring",
+                    "force_by_extension": [[-0.02, -40.0], [0.0, 0.0], [0.02, 20.0]],
+                }
+            ],
+        }
+    },
+    "contact": {"stiffness_N_per_m": 2e5},
+    "numerics": {"dt_s": 1e-3},
+}
+SCENES = {"many laws": MANY_LAWS, "canted": CANTED, "regulated": REGULATED, "tied": TIED}
 EVERY = 150
 # Contact force of every EVERYth step from the first of these on [N].
 FORCES: dict[str, list[float]] = {
@@ -186,6 +213,18 @@ FORCES: dict[str, list[float]] = {
         75.712946,
         95.081633,
         113.518164,
+    ],
+    "tied": [
+        12.474927,
+        87.507525,
+        37.918186,
+        160.256033,
+        92.341003,
+        87.856348,
+        184.884329,
+        147.965774,
+        113.862133,
+        137.257899,
     ],
 }
 
