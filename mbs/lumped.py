@@ -10,13 +10,13 @@ from scipy import linalg
 
 from catenary.mbs.air import AirForces
 from catenary.mbs.head.newmark_head import SteppedHead, head_of
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import Raising, Stepping
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
 from catenary.mbs.vehicle.base_motion import lifted
 from catenary.solver.kernels import native
 
-# Half of the time over which the speed of a base that rises is found [s]: a half cosine of 0.1 s is
-# off by (pi 1e-5 / 0.1)^2 / 6, round-off by 1e-11.
+# Half of the time over which the speed of a base that is lowered, too, is found [s]: a half cosine
+# of 0.1 s is off by (pi 1e-5 / 0.1)^2 / 6, round-off by 1e-11, and its ends by more.
 _MOMENT = 1e-5
 
 
@@ -150,7 +150,10 @@ class LumpedPantograph(SteppedHead):
         """Height and velocity of a base that rises with the lift, above where it stands under all
         of it, at times (t,) [m], [m/s]."""
         way = self._started_at - self._base_height
-        before, now, after = (
-            self._part(np.maximum(times + shift, 0.0)) for shift in (-_MOMENT, 0.0, _MOMENT)
+        parts = self._part(np.maximum(times, 0.0))
+        if isinstance(self._part, Raising):
+            return way * (1.0 - parts), -way * self._part.rates(times)
+        before, after = (
+            self._part(np.maximum(times + shift, 0.0)) for shift in (-_MOMENT, _MOMENT)
         )
-        return way * (1.0 - now), way * (before - after) / (2.0 * _MOMENT)
+        return way * (1.0 - parts), way * (before - after) / (2.0 * _MOMENT)

@@ -28,6 +28,15 @@ class Raising:
         early = np.minimum(times, self.raise_time)
         return np.asarray(0.5 * (1.0 - np.cos(np.pi * early / self.raise_time)))
 
+    def rates(self, times: np.ndarray) -> np.ndarray:
+        """Rates of the parts at ``times`` (n,) [s], shape (n,) [1/s]."""
+        found = np.zeros(times.size)
+        rising = times < self.raise_time  # never, if it is raised at once
+        if rising.any():
+            turned = np.pi * times[rising] / self.raise_time
+            found[rising] = np.pi / (2.0 * self.raise_time) * np.sin(turned)
+        return found
+
 
 class Stepping(NamedTuple):
     """Steps of a pantograph, whatever its model.

@@ -86,7 +86,7 @@ class TunnelTable(StretchTable):
         1.0, ge=0.1, le=10, description="aerodynamic forces in it over those on the open line"
     )
     portal_m: float = Field(
-        20.0, ge=0, le=1000, description="length behind each portal in which they change"
+        20.0, ge=0, le=1000, description="length inside, from either portal, in which they change"
     )
 
 
