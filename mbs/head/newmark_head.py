@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -106,6 +107,26 @@ class SteppedHead(ABC):
     def is_regulated(self) -> bool:
         """Whether a controller changes its lift under way."""
         return self._control is not None or self.by_hand
+
+    @property
+    def base_height(self) -> float:
+        """Height [m] that a step adds to that of the base in its row; none to what laws read."""
+        return 0.0 if self._mechanism is None or self._has_laws else self._mechanism.zero
+
+    def steps_as(self, other: SteppedHead) -> bool:
+        """Whether a step of both depends on state, row and contact forces alike, but for the height
+        that it adds to the base. A regulated lift counts as another."""
+        if self.is_regulated or other.is_regulated:
+            return False
+        return all(map(np.array_equal, self._numbers(), other._numbers()))
+
+    def _numbers(self) -> list[Any]:
+        """What a step depends on besides state, row, forces and `base_height`."""
+        own = [self._masses, self._stiffness, self._damping, self._push, self.levers]
+        if self._mechanism is not None:
+            tables, weight, zero = self._mechanism
+            own += [*tables, weight, zero - self.base_height]
+        return own + list(self._laws[:3])
 
     def regulate(self, regulator: Regulator | None) -> None:
         """Regulate the lift from the start on; None leaves it as it is."""

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from catenary.base.errors import InputError
-from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
+from catenary.mbs.head.head_arrays import N_DRIVE, drive_width, named
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
@@ -36,6 +36,8 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 _ROUNDINGS = 64.0 * float(np.finfo(float).eps)
 # Damping is proportional if no more than such a part of it is not.
 _PROPORTIONAL = 1e-9
+# Derivatives that differ by no more than such a part are the same: set-ups know no more.
+_SAME = 1e-9
 _NO_STEP = native.LinearStep(np.zeros((0, 0)), np.zeros(0), np.zeros(0), np.zeros((0, 0)))
 _MATRICES = ("stiffness", "damping", "mass")
 
@@ -249,11 +251,24 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
         """Without rows where nothing changes."""
         return np.ascontiguousarray(values if values.any() else values[:0])
 
+    def or_one(values: np.ndarray) -> np.ndarray:
+        """Of one step if they are the same in all, as a force is that a nominal height changes."""
+        middle = 0.5 * (values.min(axis=0) + values.max(axis=0))
+        is_same = (np.ptp(values, axis=0) <= _SAME * np.abs(middle)).all()
+        return or_none(middle[None] if is_same else values)
+
+    drives = of(lambda one: one.drives)
+
     def of_head(number: int) -> native.HeadChange:
         state, linear = of(lambda one: one.states[number]), now.heads[number]
         if not isinstance(linear, native.LinearStep):
-            models = [side.heads[number] for side in sides]
-            beside = [model.stepped for model in models if isinstance(model, SteppedHead)]
+            models = [head for side in sides if isinstance(head := side.heads[number], SteppedHead)]
+            if models[0].steps_as(models[1]):
+                # A base elsewhere is a base that is raised.
+                lower, upper = (np.array(model.base_height) for model in models)
+                named(drives[:, number])["base"] += derivative(lower, upper, step)
+                models = []
+            beside = [model.stepped for model in models]
             return native.HeadChange(*_NO_STEP, state, beside, step)
         parts = [
             of(lambda one, name=name: getattr(one.heads[number], name))  # type: ignore[misc]
@@ -269,6 +284,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
             f"{what} moves the contacts, by which a march has no derivative where strips are raked "
             "or contact wires have an irregular running surface"
         )
+    heads = [of_head(number) for number in range(len(now.heads))]
     terms: list[MatrixTerm] = []
     if any(side.matrices is not now.matrices for side in sides):
         terms = _matrices(below.matrices, above.matrices, now.matrices, step)
@@ -277,8 +293,8 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
         rest=or_none(of(lambda one: one.rest)),
         links=or_none(of(lambda one: one.links)),
         weights=or_none(of(lambda one: one.weights)),
-        heads=[of_head(number) for number in range(len(now.heads))],
-        drives=or_none(of(lambda one: one.drives)),
+        heads=heads,
+        drives=or_one(drives),
         law=or_none(of(lambda one: one.law)),
         hertz=or_none(of(lambda one: one.hertz)),
         start=start,

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "base/side_by_side.hpp"
+
 namespace catenary {
 
 Line::Line(std::vector<std::unique_ptr<Kernels>> kernels,
@@ -68,9 +70,15 @@ int64_t Line::start_of(const Work& work, int64_t station) const {
 /// Put the unknowns of a station in the order of another station type, zero for those it lacks.
 void Line::reorder(int from, int to, const double* given, double* found) const {
     const int8_t* place = &place_[(from * station_types_.size() + to) * kMostUnknowns];
-    for (size_t u = 0; u < station_types_[to].size(); ++u)
-        for (int s = 0; s < scenes_; ++s)
-            *found++ = place[u] < 0 ? 0.0 : given[place[u] * scenes_ + s];
+    const int64_t n = std::ssize(station_types_[to]);
+    with_lanes(scenes_, [&](auto lanes) {
+        using All = SideBySide<lanes>;
+        for (int64_t u = 0; u < n; ++u) {
+            typename All::Numbers own{};
+            if (place[u] >= 0) own = All::at(given + lanes * place[u]);
+            All::at(found + lanes * u) = own;
+        }
+    });
 }
 
 void Line::convert(int from, int to, Station& station) const {

@@ -29,10 +29,10 @@ struct Sums {
     }
 };
 
-/// Put minus the products of nodes along a wire, whose numbers stay in registers, as do the sums at
-/// a node and at those beside it.
-template <int64_t L>
-[[gnu::always_inline]] inline void multiply(std::span<const int64_t> run, const double* numbers,
+/// Put minus the products of the nodes of a run, or add them. Its numbers stay in registers, as do
+/// the sums at a node and at those beside it.
+template <int64_t L, bool Adds>
+[[gnu::always_inline]] inline void multiply(const ChangedRows::Run& run, const double* numbers,
                                             const Sums<L>& sums, double* loads) {
     using Numbers = typename SideBySide<L>::Numbers;
     const Numbers own = SideBySide<L>::at(numbers), level = SideBySide<L>::at(numbers + L),
@@ -40,17 +40,22 @@ template <int64_t L>
                   own_turned = SideBySide<L>::at(numbers + 3 * L),
                   sloping = SideBySide<L>::at(numbers + 4 * L),
                   bent = SideBySide<L>::at(numbers + 5 * L);
-    const int64_t step = 2 * run[2];
-    int64_t u = 2 * run[0];
-    Numbers w0 = sums.at(u - step), r0 = sums.at(u - step + 1), w1 = sums.at(u),
-            r1 = sums.at(u + 1);
-    for (int64_t k = 0; k < run[1]; ++k, u += step) {
-        const Numbers w2 = sums.at(u + step), r2 = sums.at(u + step + 1);
-        SideBySide<L>::at(loads + L * u) = own * w1 + level * (w0 + w2) + turned * (r2 - r0);
-        SideBySide<L>::at(loads + L * (u + 1)) =
-            own_turned * r1 + sloping * (w2 - w0) + bent * (r0 + r2);
+    int64_t u = 2 * run.before;
+    Numbers w0 = sums.at(u), r0 = sums.at(u + 1);
+    u = 2 * run.first;
+    Numbers w1 = sums.at(u), r1 = sums.at(u + 1);
+    const auto pass = [&](int64_t next) __attribute__((always_inline)) {
+        const Numbers w2 = sums.at(next), r2 = sums.at(next + 1);
+        Numbers one = own * w1, other = own_turned * r1;
+        double* to = loads + L * u;
+        if (Adds) one += SideBySide<L>::at(to), other += SideBySide<L>::at(to + L);
+        SideBySide<L>::at(to) = one + level * (w0 + w2) + turned * (r2 - r0);
+        SideBySide<L>::at(to + L) = other + sloping * (w2 - w0) + bent * (r0 + r2);
         w0 = w1, r0 = r1, w1 = w2, r1 = r2;
-    }
+        u = next;
+    };
+    for (int64_t k = 1; k < run.n; ++k) pass(u + 2 * run.step);
+    pass(2 * run.after);
 }
 
 /// Subtract the products of a row's further entries.
@@ -73,10 +78,20 @@ CATENARY_FOR_TARGETS
 void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t first, int64_t end,
           double* loads) {
     with_lanes(n_lanes, [&](auto n) __attribute__((always_inline)) {
-        const Sums<n> sums(rows.weights.data(), march);
         for (int64_t part = first; part < end; ++part) {
-            for (int64_t r = rows.parts(part, 0); r < rows.parts(part + 1, 0); ++r)
-                multiply<n>(rows.runs[r], rows.numbers[6 * rows.runs(r, 3)].data(), sums, loads);
+            for (int64_t r = rows.parts(part, 0); r < rows.parts(part + 1, 0); ++r) {
+                const auto& run = *reinterpret_cast<const ChangedRows::Run*>(rows.runs[r].data());
+                if (run.kind < 0) {
+                    std::fill_n(loads + 2 * n * run.first, 2 * n, 0.0);
+                    continue;
+                }
+                const Sums<n> sums(rows.weights[run.term].data(), march);
+                const double* numbers = rows.numbers[6 * run.kind].data();
+                if (run.term == 0)
+                    multiply<n, false>(run, numbers, sums, loads);
+                else
+                    multiply<n, true>(run, numbers, sums, loads);
+            }
             for (int64_t r = rows.parts(part, 1); r < rows.parts(part + 1, 1); ++r)
                 multiply_further<n>(rows, rows.rows(r, 0), rows.rows(r, 1), march, loads);
         }

@@ -155,7 +155,7 @@ void TangentSteps::wake(LanePasses& passes) const {
 /// Derivatives of the rows that drive the heads in a step; no rows if they do not change.
 Array2<const double> TangentSteps::changed_drives(const Tangent& tangent, int64_t number) const {
     if (tangent.drives.n == 0) return {};
-    return tangent.drives[tangents_.first[0] + number];
+    return tangent.drives[std::min(tangents_.first[0] + number, tangent.drives.n - 1)];
 }
 
 /// Solve the small problem of a tangent.
@@ -299,12 +299,11 @@ void TangentSteps::show(const Tangent& tangent, int64_t number) const {
 /// Fill in the displacements at arms in the rows of a group.
 void TangentSteps::show_arms(const TangentGroup& group, int64_t number) const {
     const auto arms = parts().shown.value().arms;
-    const int64_t n_pantographs = size(parts().train_outputs.ends.of_pantograph) - 1;
-    for (size_t s = 0; s < group.tangents.size(); ++s) {
-        const auto row = group.tangents[s].results[number].subspan(n_pantographs);
-        const Motion own = group.lanes.at(s);
-        for (int64_t i = 0; i < size(arms); ++i) row[i] = displacement_at(arms[i], own);
-    }
+    const int64_t first = size(parts().train_outputs.ends.of_pantograph) - 1;
+    for (int64_t i = 0; i < size(arms); ++i)
+        for (size_t s = 0; s < group.tangents.size(); ++s)
+            group.tangents[s].results(number, first + i) =
+                displacement_at(arms[i], group.lanes.at(s));
 }
 
 }  // namespace catenary

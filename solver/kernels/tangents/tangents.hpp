@@ -40,7 +40,8 @@ struct Tangent {
     Array2<const double> rest;  ///< of the wires' nodes at rest (n_nodes, 2), or no rows
     LinkChange links;
     std::vector<HeadChange> heads;
-    Array3<const double> drives;  ///< of the heads in all steps (n_steps, n_heads, width), or none
+    Array3<const double> drives;  ///< of the heads (n, n_heads, width) in all steps, in one for
+                                  ///< all of them, or in none
     LawChange law;
     std::span<const double> start;  ///< of the places of contacts at the start (n,)
     double speed;                   ///< of the train's speed
