@@ -14,6 +14,7 @@ inline Then then_of(const Work& work) {
 }
 // Passes take it as an argument, a constant of these types where a pass is compiled for it alone.
 using Newmark = std::integral_constant<Then, Then::kNewmark>;
+using Alpha = std::integral_constant<Then, Then::kAlpha>;
 using IsProduct = std::false_type;
 
 /// Arrays and coefficients of a chain, held by value so that a compiler keeps them in registers.
@@ -334,8 +335,8 @@ class KernelsOf final : public Kernels {
     Blocks blocks_;
 };
 
-/// Kernels of one kind of blocks for the calls that take most of a step's time in Newmark's family:
-/// two chains at once, and of a mixed line single ones as well; others do the rest.
+/// Kernels of one kind of blocks for the calls that take most of a step's time: two chains at once,
+/// and of a mixed line single ones by Newmark's method as well; others do the rest.
 template <class Blocks, bool IsMixed>
 class QuickKernels final : public Kernels {
   public:
@@ -356,6 +357,8 @@ class QuickKernels final : public Kernels {
     void back(const Work& work, Chain& one, int step, Chain* other) const override {
         const bool is_newmark = then_of(work) == Then::kNewmark;
         if (other && is_newmark) return go_back(blocks_, work, one, *other, Newmark{});
+        if (other && then_of(work) == Then::kAlpha)
+            return go_back(blocks_, work, one, *other, Alpha{});
         if constexpr (IsMixed)
             if (is_newmark) return go_back(blocks_, work, one, step, Newmark{});
         rest_->back(work, one, step, other);
