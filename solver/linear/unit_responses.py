@@ -270,18 +270,22 @@ class UnitResponses:
         answers = self._answers(dofs, weights, first, last, further)
         begin = places.begin[owned] + self._ownership.first - first
         low, high = (numbering.starts[station[owned]] for station in (places.first, places.last))
-        parts = low - first, high - first, begin, places.width[owned], at[places.width[chosen] > 0]
-        n_forces, leak = dofs.shape[1], 0.0
-        for number, (before, after, start, width, to) in enumerate(
-            zip(*(part.tolist() for part in parts), strict=True)
-        ):
-            own = answers[n_forces * number : n_forces * (number + 1)]
-            data[to : to + n_forces * width] = own[:, start : start + width].ravel()
-            size = np.abs(own)
-            peak = size.max(axis=1)
-            size[:, before:after] = 0.0
-            leak = max(leak, float((size.max(axis=1) / np.maximum(peak, _TINY)).max()))
-        return leak
+        n_forces, width = dofs.shape[1], places.width[owned]
+        column = np.arange(answers.shape[1])
+
+        def within(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+            """Columns of answers between two of each place."""
+            first, last = (np.repeat(one, n_forces)[:, None] for one in (start, end))
+            return (column >= first) & (column < last)
+
+        sizes = n_forces * width
+        to = at[places.width[chosen] > 0] - np.cumsum(sizes) + sizes
+        values = answers[within(begin, begin + width)]
+        data[np.repeat(to, sizes) + np.arange(values.size)] = values
+        beyond = np.abs(answers)
+        peak = np.maximum(beyond.max(axis=1), _TINY)
+        beyond[within(low - first, high - first)] = 0.0
+        return float((beyond.max(axis=1) / peak).max())
 
 
 class Places(NamedTuple):

@@ -38,7 +38,6 @@ class _Pairs:
     """
 
     n_terms: int
-
     kinds: np.ndarray
     begin: np.ndarray
     counts: np.ndarray
