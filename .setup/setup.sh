@@ -291,10 +291,10 @@ CODE
     fi
     compile_kernels "some two minutes"
     pip_install --no-deps --no-build-isolation --editable .
-    begin "compiling the packages to bytecode"
+    begin "compiling the packages and the program to bytecode"
     # Bytecode on all cores at once: pip makes it on one, which took a third of its time. Packages
     # may bring files that are no Python of this version.
-    .venv/bin/python -I -m compileall -q -j 0 \
+    .venv/bin/python -I -m compileall -q -j 0 cases mbs meshgen postproc solver \
         "$(.venv/bin/python -I -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null || true
     # -E: the program reads the environment's packages, not those of the user's PYTHONPATH. In the
     # second line the interpreter stands if its path is too long for the first.
