@@ -18,7 +18,7 @@ from catenary.solver.tangents.set_up import Change
 # equal elements are equal then.
 _BITS = 40
 # Pairs of rows in a part of the line, whose stations a range that moves takes together.
-_PART = 64
+_PART = 128
 # Entries of a node of a wire: pairs beside its own, and their unknowns.
 _BESIDE, _UNKNOWN = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 1, 0, 1, 0, 1])
 _NO_NUMBERS = np.zeros(0, dtype=np.int64)
@@ -207,11 +207,14 @@ def _nodes(pairs: _Pairs, n_whole: int) -> _Nodes:
 
 
 def _runs(pairs: _Pairs, nodes: _Nodes) -> np.ndarray:
-    """Runs, see `native.ChangedRows`; each is within a part of the line."""
+    """Runs, see `native.ChangedRows`; each is within a part of the line.
+
+    The runs of a wire in a part follow each other.
+    """
     kind, after = nodes.kind, nodes.after
     own, term, part = np.arange(kind.size), pairs.term, pairs.pair // _PART
     following = after * pairs.n_terms + term
-    joins = (kind >= 0) & (nodes.before[following] == pairs.pair) & (kind[following] == kind)
+    joins = (kind >= 0) & (kind[following] >= 0) & (nodes.before[following] == pairs.pair)
     joins &= part[following] == part
     graph = sparse.csr_matrix((joins[joins], (own[joins], following[joins])), (own.size, own.size))
     _, wire = csgraph.connected_components(graph, directed=False)
@@ -219,10 +222,11 @@ def _runs(pairs: _Pairs, nodes: _Nodes) -> np.ndarray:
     # Every pair has the first term, if only zeros.
     order = order[(kind >= 0)[order] | (term == 0)[order]]
     step = np.diff(pairs.pair[order], prepend=0)
-    is_first = np.diff(wire[order], prepend=-1) != 0
+    last, goes_on = order[:-1], np.zeros(order.size, dtype=bool)
+    goes_on[1:] = joins[last] & (following[last] == order[1:]) & (kind[last] == kind[order[1:]])
     # Another distance to the next node is another run.
-    is_first[1:] |= ~is_first[:-1] & (step[1:] != step[:-1])
-    starts = np.flatnonzero(is_first)
+    goes_on[1:] &= ~goes_on[:-1] | (step[1:] == step[:-1])
+    starts = np.flatnonzero(~goes_on)
     sizes = np.diff(starts, append=order.size)
     first, last = order[starts], order[starts + sizes - 1]
     step = np.where(sizes > 1, step[np.minimum(starts + 1, order.size - 1)], 0)

@@ -34,9 +34,8 @@ class TangentSteps(CompiledSteps):
 
     Attributes
     ----------
-    results : (most, n_changes, 2 n_pantographs + n_arms) derivatives after the steps of the latest
-        block of contact forces [N], uplifts [m] and heights of heads [m], per unit of each
-        parameter
+    results : (n_changes, n_steps, 2 n_pantographs + n_arms) derivatives after each step of contact
+        forces [N], uplifts [m] and heights of heads [m], per unit of each parameter
     switches : as in `MarchTangents` of `kernels/tangents/tangents.hpp`
 
     Parameters
@@ -44,6 +43,8 @@ class TangentSteps(CompiledSteps):
     changes : of the set-up by each parameter
     others : heads of two further set-ups of the same march
     starts : derivatives of the line's acceleration at the start, (n_local,) each [m/s2 per unit]
+    arms : (n_arms,) numbers of the steady arms whose uplift is differentiated
+    n_steps : of the march
     """
 
     def __init__(
@@ -54,12 +55,13 @@ class TangentSteps(CompiledSteps):
         changes: Sequence[Change],
         others: Sequence[Sequence[native.LinearStep | SteppedHead]],
         starts: Sequence[np.ndarray],
+        arms: np.ndarray,
+        n_steps: int,
     ) -> None:
         super().__init__(scheme, showing, dt, shows=True)
         make_room(scheme)
         line, pantographs = scheme.interaction.line, scheme.pantographs
-        n_results = 2 * pantographs.n + showing.shown.arms.size
-        self._by_tangent = np.zeros((len(changes), self.most, n_results))
+        self.results = np.zeros((len(changes), n_steps, 2 * pantographs.n + arms.size))
         n, first = pantographs.n_contacts, np.zeros(1, dtype=np.int64)
         self.switches = np.zeros(3, dtype=np.int64)
 
@@ -71,9 +73,7 @@ class TangentSteps(CompiledSteps):
         )
         self._tangents = native.MarchTangents(
             [
-                native.TangentGroup(
-                    own, [_tangent(changes[k], n, self._by_tangent[k]) for k in group]
-                )
+                native.TangentGroup(own, [_tangent(changes[k], n, self.results[k]) for k in group])
                 for own, group in zip(lanes, groups, strict=True)
             ],
             [
@@ -82,17 +82,14 @@ class TangentSteps(CompiledSteps):
                 for heads in zip(*others, strict=True)
             ],
             scheme.interaction.links.local,
+            showing.shown.arms[arms],
             first,
             self.switches,
         )
 
     @property
-    def results(self) -> np.ndarray:
-        return self._by_tangent.transpose(1, 0, 2)
-
-    @property
     def block(self) -> slice:
-        """Steps of the latest block in ``rows`` and ``results``."""
+        """Steps of the latest block in ``rows``."""
         return self._block
 
     def _prepare(self, step: int, left: int) -> None:
@@ -189,27 +186,25 @@ def march_with_tangents(comm: Any, at_rest: LineAtRest, changes: Sequence[Change
         line = scheme.interaction.line
         still = line.acceleration.copy()
         starts = [_start_of(comm, at_rest, change, still, line.ownership) for change in changes]
-        steps = TangentSteps(scheme, showing, dt, changes, others, starts)
-        columns = [showing.layout.columns[name] for name in _CHANNELS]
-        rows: list[list[np.ndarray]] = [[] for _ in columns]
-        results, step = [], 0
         arms = at_rest.mesh.x(at_rest.mesh.steady_arms)
         first, last = at_rest.problem.evaluation
         evaluated = np.flatnonzero((first <= arms) & (arms <= last))
+        steps = TangentSteps(scheme, showing, dt, changes, others, starts, evaluated, march.n_steps)
+        columns = [showing.layout.columns[name] for name in _CHANNELS]
+        rows: list[list[np.ndarray]] = [[] for _ in columns]
+        step = 0
         n = scheme.pantographs.n
         moved = np.array([_moved(change, scheme.pantographs) for change in changes])
         moved = moved.reshape(len(changes), n)
-        kept_results = np.r_[np.arange(n), n + evaluated, n + arms.size + np.arange(n)]
         with flushed():
             while step < march.n_steps:
                 left = march.n_steps - step
                 steps.take(step, min(steps.most, left), left)
                 for kept, part in zip(rows, columns, strict=True):
                     kept.append(steps.rows[steps.block, part].copy())
-                results.append(steps.results[steps.block][..., kept_results])
                 step += steps.taken
     position, force, uplift, height = (np.concatenate(kept) for kept in rows)
-    found = np.concatenate(results)
+    found = steps.results.transpose(1, 0, 2)
     time = dt * np.arange(1, len(force) + 1)
     return Tangents(
         dt=dt,

@@ -66,6 +66,9 @@ PassLine::PassLine(const PassParts& parts, int scenes)
         size(arrays.answer) < line.n_solved() || !holds(arrays.loads, line.n_solved()) ||
         size(m.x) < own || !holds(arrays.known, own))
         throw std::invalid_argument("arrays of a line have fewer numbers than its stations");
+    if (scenes == 1) return;
+    even = line.even_rows(work, n);
+    work.product.even = even.data();
 }
 
 TwoPasses::TwoPasses(PassParts parts) : parts_(std::move(parts)), line_(parts_) {}

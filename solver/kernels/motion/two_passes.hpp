@@ -37,6 +37,7 @@ struct PassParts {
 struct PassLine {
     Line line;
     Work work;
+    std::vector<uint8_t> even;  ///< see `Product`
 
     explicit PassLine(const PassParts& parts, int scenes = 1);
 };

@@ -68,6 +68,7 @@ struct Blocks : Masks {
     static constexpr bool kHalf = kInLast < kVector;
     /// Whether a chain waits for its products, and not the processor for their numbers.
     static constexpr bool kNarrow = kN == 1;
+    static constexpr bool kHasEven = false;
     using V = Vector<kVector>;
     using X = Lanes<kN, kVector>;
 

@@ -61,6 +61,13 @@ void Line::set_runs(const Work& work, int64_t n, int64_t low) {
     n_read_ = read.starts.empty() ? 0 : end_of(read, first + n);
 }
 
+std::vector<uint8_t> Line::even_rows(const Work& work, int64_t n) const {
+    std::vector<uint8_t> even;
+    for (int64_t i = 0; i < n; ++i)
+        even.push_back(kernels_[station_type(work, i)]->is_even(work.product.rows.at(i)));
+    return even;
+}
+
 int64_t Line::start_of(const Work& work, int64_t station) const {
     if (work.factored.places.starts.empty()) return kernels_[0]->rows.unknowns * scenes_ * station;
     const bool is_end = station == static_cast<int64_t>(run_number_.size());

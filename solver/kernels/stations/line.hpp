@@ -44,6 +44,7 @@ struct Product {
     int64_t first = 0;
     Sections places;
     const double *factor = nullptr, *velocity = nullptr;
+    const uint8_t* even = nullptr;  ///< of each station, see `Kernels::is_even`; only of scenes
 };
 
 struct Factored {
@@ -116,6 +117,8 @@ class Kernels {
   public:
     Kernels(const Layout& r, const Layout& f) : rows(r), factors(f) {}
     virtual ~Kernels() = default;
+    /// Whether these rows of a station are even about it, which some kernels multiply with less.
+    virtual bool is_even(const double*) const { return false; }
     /// Rows of a product with K, and -C.
     virtual void multiply(const Work&, const Chain&, double* result) const = 0;
     /// The pass forth through one chain, whose next station is a `step` of 1 or -1 further, and
@@ -162,6 +165,8 @@ class Line {
 
     /// Find the runs of the n stations of a solve. Arrays of motion begin at station `low`.
     void set_runs(const Work&, int64_t n, int64_t low);
+    /// Of each of n stations whether its rows are even, see `Kernels`.
+    std::vector<uint8_t> even_rows(const Work&, int64_t n) const;
     /// Numbers that the vectors of a solve, and the operands of products, have at least.
     int64_t n_solved() const { return n_solved_; }
     int64_t n_read() const { return n_read_; }

@@ -37,6 +37,7 @@ struct Chained {
 
     const Blocks& blocks;
     Table rows, inverse, joined;
+    const uint8_t* even;
     const double *factor, *velocity, *loads, *right_side;
     double *answer, *x, *y, *z, *known;
     Changes changes;
@@ -46,6 +47,7 @@ struct Chained {
           rows(work.product.rows),
           inverse(work.factored.inverse),
           joined(work.factored.beside),
+          even(work.product.even),
           factor(work.product.factor + run.read),
           velocity(work.product.velocity + run.read),
           loads(work.loads ? work.loads + run.solved : nullptr),
@@ -86,6 +88,12 @@ struct Chained {
         const double* numbers = kept(rows.at(i));
         const int to_start = blocks.own_size, to_end = to_start + blocks.row_beside_size;
         Sums<X> sums = no_sums<X>();
+        if constexpr (Blocks::kHasEven)
+            if (even[i]) {
+                blocks.add_even(sums, numbers, numbers + (step > 0 ? to_end : to_start),
+                                before.position, here.position, after.position);
+                return sums;
+            }
         blocks.add_own(sums, numbers, here.position);
         blocks.add_row_beside(sums, numbers + (step > 0 ? to_start : to_end), before.position);
         blocks.add_row_beside(sums, numbers + (step > 0 ? to_end : to_start), after.position);
@@ -293,6 +301,10 @@ template <class Blocks, bool IsForSteps = false>
 class KernelsOf final : public Kernels {
   public:
     KernelsOf(const Layout& r, const Layout& f) : Kernels(r, f), blocks_(r, f) {}
+    bool is_even(const double* rows) const override {
+        if constexpr (Blocks::kHasEven) return Blocks::is_even(rows);
+        return Kernels::is_even(rows);
+    }
     void multiply(const Work& work, const Chain& chain, double* result) const override {
         multiply_rows(blocks_, work, chain, result);
     }

@@ -36,7 +36,7 @@ template <int K, int L>
 struct SceneBlocks : KnownMasks<K> {
     using Of = KnownMasks<K>;
     static constexpr int W = Of::r.unknowns, pitch = W * L;
-    static constexpr bool kNarrow = false;
+    static constexpr bool kNarrow = false, kHasEven = W % 2 == 0 && !Of::is_damped;
     using V = Vector<L>;
     using X = Lanes<W, L>;
 
@@ -52,6 +52,38 @@ struct SceneBlocks : KnownMasks<K> {
         each<W>([&](auto u) CATENARY_HOT { write<L, L>(to + L * u, x.piece[u]); });
     }
     CATENARY_INLINE static X total_of(const Sums<X>& sums) { return sums.one; }
+
+    /// Whether rows join pairs of unknowns, deflection and rotation, each only with itself here and
+    /// beside, even about the station: those of nodes between equal elements without droppers.
+    static bool is_even(const double* numbers) {
+        const double *to_start = numbers + Of::own_size, *to_end = to_start + Of::row_beside_size;
+        for (const Numbered& own : kOwn.of)
+            if (own.joint.row != own.joint.column && numbers[own.at] != 0.0) return false;
+        for (const auto& [joint, at, _] : kRowBeside.of) {
+            const double sign = joint.row == joint.column ? 1.0 : -1.0;
+            if (to_start[at] != sign * to_end[at]) return false;
+            if (joint.row / 2 != joint.column / 2 && to_end[at] != 0.0) return false;
+        }
+        return true;
+    }
+    /// Add such rows, `ahead` with the station after: half as many products, and sums that
+    /// processors make beside them.
+    CATENARY_INLINE static void add_even(Sums<X>& sums, const double* own, const double* ahead,
+                                         const X& before, const X& here, const X& after) {
+        each<W / 2>([&](auto pair) CATENARY_HOT {
+            constexpr int w = 2 * pair, r = w + 1;
+            const V level = before.piece[w] + after.piece[w],
+                    rise = after.piece[w] - before.piece[w],
+                    turned = before.piece[r] + after.piece[r],
+                    bend = after.piece[r] - before.piece[r];
+            sums.one.piece[w] += own[at<kOwn, w, w>] * here.piece[w] +
+                                 ahead[at<kRowBeside, w, w>] * level +
+                                 ahead[at<kRowBeside, w, r>] * bend;
+            sums.one.piece[r] += own[at<kOwn, r, r>] * here.piece[r] +
+                                 ahead[at<kRowBeside, r, w>] * rise +
+                                 ahead[at<kRowBeside, r, r>] * turned;
+        });
+    }
 
     CATENARY_INLINE static void add_own(Sums<X>& sums, const double* numbers, const X& x) {
         add<kOwn>(sums, numbers, x);
@@ -82,6 +114,13 @@ struct SceneBlocks : KnownMasks<K> {
     static constexpr auto kBeside = of<Of::beside_size>(Of::beside);
     static constexpr auto kHalf = of<Of::half_size>(kHalfMask);
 
+    /// Where the number stands that joins a row with a column.
+    template <const auto& List, int Row, int Column>
+    static constexpr int at = [] {
+        for (const Numbered& one : List.of)
+            if (one.joint.row == Row && one.joint.column == Column) return one.at;
+        return -1;
+    }();
     template <const auto& List, bool IsSymmetric = false>
     CATENARY_INLINE static void add(Sums<X>& sums, const double* numbers, const X& x) {
         each<List.n>([&](auto p) CATENARY_HOT {

@@ -29,32 +29,45 @@ struct Sums {
     }
 };
 
-/// Put minus the products of the nodes of a run, or add them. Its numbers stay in registers, as do
-/// the sums at a node and at those beside it.
+/// The sums of a term at a node of a wire and at the one before, in registers.
+template <int64_t L>
+struct Walk {
+    using Numbers = typename SideBySide<L>::Numbers;
+    int64_t term = -1, before = -1, here = -1;  ///< first unknowns
+    Numbers w0{}, r0{}, w1{}, r1{};
+
+    /// Go to the first node of a run, which most runs begin at where the one before ended.
+    [[gnu::always_inline]] void begin(const ChangedRows::Run& run, const Sums<L>& sums) {
+        if (run.term == term && 2 * run.before == before && 2 * run.first == here) return;
+        term = run.term, before = 2 * run.before, here = 2 * run.first;
+        w0 = sums.at(before), r0 = sums.at(before + 1);
+        w1 = sums.at(here), r1 = sums.at(here + 1);
+    }
+};
+
+/// Put minus the products of the nodes of a run, or add them; its numbers stay in registers.
 template <int64_t L, bool Adds>
 [[gnu::always_inline]] inline void multiply(const ChangedRows::Run& run, const double* numbers,
-                                            const Sums<L>& sums, double* loads) {
+                                            const Sums<L>& sums, Walk<L>& walk, double* loads) {
     using Numbers = typename SideBySide<L>::Numbers;
     const Numbers own = SideBySide<L>::at(numbers), level = SideBySide<L>::at(numbers + L),
                   turned = SideBySide<L>::at(numbers + 2 * L),
                   own_turned = SideBySide<L>::at(numbers + 3 * L),
                   sloping = SideBySide<L>::at(numbers + 4 * L),
                   bent = SideBySide<L>::at(numbers + 5 * L);
-    int64_t u = 2 * run.before;
-    Numbers w0 = sums.at(u), r0 = sums.at(u + 1);
-    u = 2 * run.first;
-    Numbers w1 = sums.at(u), r1 = sums.at(u + 1);
+    walk.begin(run, sums);
     const auto pass = [&](int64_t next) __attribute__((always_inline)) {
+        auto& [_, before, here, w0, r0, w1, r1] = walk;
         const Numbers w2 = sums.at(next), r2 = sums.at(next + 1);
         Numbers one = own * w1, other = own_turned * r1;
-        double* to = loads + L * u;
+        double* to = loads + L * here;
         if (Adds) one += SideBySide<L>::at(to), other += SideBySide<L>::at(to + L);
         SideBySide<L>::at(to) = one + level * (w0 + w2) + turned * (r2 - r0);
         SideBySide<L>::at(to + L) = other + sloping * (w2 - w0) + bent * (r0 + r2);
+        before = here, here = next;
         w0 = w1, r0 = r1, w1 = w2, r1 = r2;
-        u = next;
     };
-    for (int64_t k = 1; k < run.n; ++k) pass(u + 2 * run.step);
+    for (int64_t k = 1; k < run.n; ++k) pass(walk.here + 2 * run.step);
     pass(2 * run.after);
 }
 
@@ -79,6 +92,7 @@ void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t
           double* loads) {
     with_lanes(n_lanes, [&](auto n) __attribute__((always_inline)) {
         for (int64_t part = first; part < end; ++part) {
+            Walk<n> walk;
             for (int64_t r = rows.parts(part, 0); r < rows.parts(part + 1, 0); ++r) {
                 const auto& run = *reinterpret_cast<const ChangedRows::Run*>(rows.runs[r].data());
                 if (run.kind < 0) {
@@ -88,9 +102,9 @@ void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t
                 const Sums<n> sums(rows.weights[run.term].data(), march);
                 const double* numbers = rows.numbers[6 * run.kind].data();
                 if (run.term == 0)
-                    multiply<n, false>(run, numbers, sums, loads);
+                    multiply<n, false>(run, numbers, sums, walk, loads);
                 else
-                    multiply<n, true>(run, numbers, sums, loads);
+                    multiply<n, true>(run, numbers, sums, walk, loads);
             }
             for (int64_t r = rows.parts(part, 1); r < rows.parts(part + 1, 1); ++r)
                 multiply_further<n>(rows, rows.rows(r, 0), rows.rows(r, 1), march, loads);

@@ -50,6 +50,10 @@ TangentSteps::TangentSteps(StepParts parts, Block block, MarchTangents tangents)
 }
 
 Taken TangentSteps::take(int64_t first, int64_t end) {
+    for (const TangentGroup& group : tangents_.groups)
+        for (const Tangent& tangent : group.tangents)
+            if (tangent.results.rows < in_march(end))
+                throw std::invalid_argument("a tangent has results of fewer steps");
     for (int64_t number = first; number < end; ++number) {
         heads_.keep();
         const Taken taken = Steps::take(number, number + 1);
@@ -155,7 +159,7 @@ void TangentSteps::wake(LanePasses& passes) const {
 /// Derivatives of the rows that drive the heads in a step; no rows if they do not change.
 Array2<const double> TangentSteps::changed_drives(const Tangent& tangent, int64_t number) const {
     if (tangent.drives.n == 0) return {};
-    return tangent.drives[std::min(tangents_.first[0] + number, tangent.drives.n - 1)];
+    return tangent.drives[std::min(in_march(number), tangent.drives.n - 1)];
 }
 
 /// Solve the small problem of a tangent.
@@ -282,7 +286,7 @@ void TangentSteps::remember(const Tangent& tangent) const {
 void TangentSteps::show(const Tangent& tangent, int64_t number) const {
     const auto& [of_strip, of_pantograph] = parts().train_outputs.ends;
     const double gamma = parts().law.reported.gamma;
-    const auto row = tangent.results[number];
+    const auto row = tangent.results[in_march(number)];
     const int64_t n_pantographs = size(of_pantograph) - 1;
     for (int64_t p = 0; p < n_pantographs; ++p) {
         row[p] = 0.0;
@@ -292,17 +296,17 @@ void TangentSteps::show(const Tangent& tangent, int64_t number) const {
             tangent.law.latest[i] = solution_[i];
         }
     }
-    const auto heights = row.subspan(n_pantographs + size(parts().shown.value().arms));
+    const auto heights = row.subspan(n_pantographs + size(tangents_.arms));
     for (int64_t p = 0; p < n_pantographs; ++p) heights[p] = heads_.height(p, tangent.heads[p]);
 }
 
 /// Fill in the displacements at arms in the rows of a group.
 void TangentSteps::show_arms(const TangentGroup& group, int64_t number) const {
-    const auto arms = parts().shown.value().arms;
+    const auto arms = tangents_.arms;
     const int64_t first = size(parts().train_outputs.ends.of_pantograph) - 1;
     for (int64_t i = 0; i < size(arms); ++i)
         for (size_t s = 0; s < group.tangents.size(); ++s)
-            group.tangents[s].results(number, first + i) =
+            group.tangents[s].results(in_march(number), first + i) =
                 displacement_at(arms[i], group.lanes.at(s));
 }
 

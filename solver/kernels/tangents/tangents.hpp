@@ -45,7 +45,7 @@ struct Tangent {
     LawChange law;
     std::span<const double> start;  ///< of the places of contacts at the start (n,)
     double speed;                   ///< of the train's speed
-    Array2<double> results;         ///< (n, 2 n_pantographs + n_arms) of each step of a block:
+    Array2<double> results;         ///< (n, 2 n_pantographs + n_arms) of each step of the march:
                                     ///< contact forces, displacements at arms, heights of heads
     CATENARY_RECORD(rest, links, heads, drives, law, start, speed, results)
     CATENARY_SHAPES("* 2?")
@@ -64,10 +64,11 @@ struct MarchTangents {
     /// Two copies of each head that is no linear chain, for changed states.
     std::vector<std::vector<Head*>> pairs;
     Links links;                     ///< of the line, by their numbers
+    std::span<const int64_t> arms;   ///< unknowns whose displacements are shown
     std::span<const int64_t> first;  ///< (1,) steps of the march before the block
     std::span<int64_t> switches;     ///< (3,) steps in which a contact is open, in which a contact
                                      ///< opened or closed, and in which links switched
-    CATENARY_RECORD(groups, pairs, links, first, switches)
+    CATENARY_RECORD(groups, pairs, links, arms, first, switches)
 };
 
 /// Steps with tangents.
@@ -91,6 +92,8 @@ class TangentSteps : public Steps {
     void wake(LanePasses& passes) const;
     void solve(const Tangent& tangent, const Motion& own);
     void load(const Tangent& tangent, const TangentLanes& lanes, int64_t lane, double way) const;
+    /// The number of a step of the block in the march.
+    int64_t in_march(int64_t number) const { return tangents_.first[0] + number; }
     Array2<const double> changed_drives(const Tangent& tangent, int64_t number) const;
     void find_places(const Tangent& tangent, const Motion& own, double way);
     double of_law(const Tangent& tangent, int64_t contact) const;
