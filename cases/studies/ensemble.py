@@ -391,5 +391,5 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineA
 def _done(
     number: int, head: Header, tables: dict[str, np.ndarray], extremes: dict[str, np.ndarray]
 ) -> Marched:
-    file = MarchedFile(head, tables, extremes, DONE, {FILTERED: filters.ABOUT})
+    file = MarchedFile(head, tables, extremes, {FILTERED: filters.ABOUT})
     return Marched(number, DONE, Results.of(file), tables)
