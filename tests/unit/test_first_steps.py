@@ -296,9 +296,7 @@ def test_what_runs_do_without_is_not_needed(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_part_that_fails_is_a_finding(
     monkeypatch: pytest.MonkeyPatch, program: str, facts: str, state: str
 ) -> None:
-    monkeypatch.setattr(installation._answer, "__defaults__", (1.0,))
-    if state == OK:
-        monkeypatch.setattr(installation._answer, "__defaults__", (30.0,))
+    monkeypatch.setattr(installation, "LIMIT", 30.0 if state == OK else 1.0)
     found = installation._tried("a part", program, "mend it", needed=True)
     assert found.state == state and facts in found.facts
     assert found.prevents_runs == (state != OK)
