@@ -164,15 +164,13 @@ def _answer(command: list[str], *, launches: bool = False) -> tuple[int, str]:
         try:
             code = process.wait(LIMIT)
         except subprocess.TimeoutExpired:
-            code = -1
+            return -1, f"no answer within {LIMIT:g} s"
         finally:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
         stream.seek(0)
         lines = [line.strip() for line in stream.read().splitlines() if re.search(r"\w", line)]
-    if code == -1:
-        return code, f"no answer within {LIMIT:g} s"
     if code < 0:
         return code, f"ended by signal {-code}"
     return code, (lines[-1] if lines else f"exit code {code}")[:_LONGEST]

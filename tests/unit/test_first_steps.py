@@ -289,6 +289,7 @@ def test_what_runs_do_without_is_not_needed(monkeypatch: pytest.MonkeyPatch) -> 
         ("import no_such_module_at_all", "No module named", MISSING),
         ("raise ValueError('it is old')", "ValueError: it is old", BROKEN),
         ("import os; os.kill(os.getpid(), 11)", "ended by signal 11", BROKEN),
+        ("import os; os.kill(os.getpid(), 1)", "ended by signal 1", BROKEN),
         ("import time; time.sleep(60)", "no answer within 1 s", BROKEN),
         ("print('7.1', '\\n----')", "7.1", OK),
     ],
