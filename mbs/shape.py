@@ -97,7 +97,7 @@ class LumpedShape:
         self._n, self.below = data.n_masses, BELOW_HEAD
         head = _head_lines(data.strips.contact_offsets, data.strips.length)
         arms = _arms()
-        spring = _spring(0.0, -_APEX)
+        spring = _spring()
         self._points, self.cells = _joined([head, arms, spring[:2]])
         apex = 1.0 if self._n > 1 else 0.0
         roof = float(self._n)
@@ -276,11 +276,12 @@ def _arms() -> tuple[np.ndarray, np.ndarray]:
     return np.array(points), np.array(cells)
 
 
-def _spring(top: float, bottom: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A zigzag line, and how far along it each point is, from 0 to 1."""
+def _spring() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A zigzag line from the head down to the apex, and how far along it each point is, from 0 to
+    1."""
     share = np.linspace(0.0, 1.0, _TURNS + 2)
     beside = _HALF_TURN * np.concatenate([[0.0], np.resize([1.0, -1.0], _TURNS), [0.0]])
-    points = np.column_stack([beside, np.zeros(share.size), top + share * (bottom - top)])
+    points = np.column_stack([beside, np.zeros(share.size), -_APEX * share])
     first = np.arange(share.size - 1)
     return points, np.column_stack([first, first + 1]), share
 

@@ -129,7 +129,7 @@ def _tried(part: str, program: str, remedy: str, needed: bool = False) -> Findin
     return Finding(part, state, answer, remedy, needed)
 
 
-def _answer(command: list[str], limit: float = LIMIT, *, launches: bool = False) -> tuple[int, str]:
+def _answer(command: list[str], *, launches: bool = False) -> tuple[int, str]:
     """Exit code and last line of a command's answer; whatever it started has ended then.
 
     Unless the command ``launches`` ranks, MPI starts there as it does in a run.
@@ -162,17 +162,15 @@ def _answer(command: list[str], limit: float = LIMIT, *, launches: bool = False)
         except OSError as error:
             return 1, (error.strerror or str(error)).lower()
         try:
-            code = process.wait(limit)
+            code = process.wait(LIMIT)
         except subprocess.TimeoutExpired:
-            code = -1
+            return -1, f"no answer within {LIMIT:g} s"
         finally:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
         stream.seek(0)
         lines = [line.strip() for line in stream.read().splitlines() if re.search(r"\w", line)]
-    if code == -1:
-        return code, f"no answer within {limit:g} s"
     if code < 0:
         return code, f"ended by signal {-code}"
     return code, (lines[-1] if lines else f"exit code {code}")[:_LONGEST]

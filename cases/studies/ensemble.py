@@ -309,7 +309,7 @@ class _Line:
             "config": {},
         }
         if self._latest is None or self._latest[0] is not at_rest.model:
-            self._latest = at_rest.model, self._datasets(problem, at_rest)
+            self._latest = at_rest.model, self._datasets(at_rest)
         return Header(
             attributes,
             {**self._latest[1], "line/evaluation_range": np.array(problem.evaluation)},
@@ -320,7 +320,7 @@ class _Line:
             ),
         )
 
-    def _datasets(self, problem: Problem, at_rest: LineAtRest) -> dict[str, np.ndarray]:
+    def _datasets(self, at_rest: LineAtRest) -> dict[str, np.ndarray]:
         """Datasets of the head of results, but for what depends on the train."""
         mesh, form = at_rest.mesh, at_rest.form
         points = mesh.points.copy()
@@ -391,5 +391,5 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineA
 def _done(
     number: int, head: Header, tables: dict[str, np.ndarray], extremes: dict[str, np.ndarray]
 ) -> Marched:
-    file = MarchedFile(head, tables, extremes, DONE, {FILTERED: filters.ABOUT})
+    file = MarchedFile(head, tables, extremes, {FILTERED: filters.ABOUT})
     return Marched(number, DONE, Results.of(file), tables)

@@ -13,8 +13,9 @@ from catenary.meshgen.hardware import Clamps, DropperKind, Droppers, SteadyArm, 
 from catenary.meshgen.track import Curve, Spans
 from catenary.meshgen.wires import Conductor, Role, Section
 
-# Two cuts of a wire closer than this are taken for a slip of the pen [m].
-SHORTEST_GAP = 1e-3
+# Two cuts of a wire closer than this are taken for a slip of the pen [m]: a millimetre, less the
+# round-off of places up to 1000 km along the track.
+SHORTEST_GAP = 1e-3 - 2e-10
 
 
 class Course(NamedTuple):

@@ -9,7 +9,6 @@ are written after the rows.
 
 from __future__ import annotations
 
-import logging
 import os
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
@@ -65,8 +64,6 @@ from catenary.solver.time_loop.views.channels import Channel
 if TYPE_CHECKING:
     from catenary.postproc.channels.header import Header
     from catenary.solver.time_loop.views.observers import Stage
-
-logger = logging.getLogger("catenary.results")
 
 # The state to continue from is kept twice and written in turn: a run that is killed while it
 # writes one still has the other.

@@ -1,4 +1,5 @@
-"""Results of a march whose histories are in memory: a result file that was never written."""
+"""Results of a march to its end whose histories are in memory: a result file that was never
+written."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from catenary.postproc.channels.header import Header
 from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.records import Records
 
 
@@ -30,14 +32,13 @@ class _Table:
 
 
 class MarchedFile:
-    """Tables of a march in memory, which `Results` reads. Not collective.
+    """Tables of a march to its end in memory, which `Results` reads. Not collective.
 
     Parameters
     ----------
     header : of the run
     tables : path in a result file -> array of what grows with the steps, ``time`` among them
     extremes : channel of the line -> smallest and largest values over all steps, (2, columns)
-    outcome : how the march ended
     about : path -> attributes of a table that has some
     """
 
@@ -46,7 +47,6 @@ class MarchedFile:
         header: Header,
         tables: Mapping[str, np.ndarray],
         extremes: Mapping[str, np.ndarray],
-        outcome: str,
         about: Mapping[str, Mapping[str, Any]],
     ) -> None:
         self._tables = {
@@ -54,7 +54,7 @@ class MarchedFile:
             for path, values in {**header.datasets, **tables}.items()
         }
         self._extremes = dict(extremes)
-        self.attrs = {"n_ranks": 1, **header.attributes, "outcome": outcome}
+        self.attrs = {"n_ranks": 1, **header.attributes, "outcome": DONE}
         self.facts = dict(header.facts)
         self.damage: list[str] = []
         self.has_energies = False

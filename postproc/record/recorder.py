@@ -136,8 +136,6 @@ class Recorder(FileObserver[ResultFile]):
 
     def next_state(self, step: int) -> int:
         """The step of the next flush, or record of energies that need more than the motion."""
-        if not self._flushed_once:
-            return step + 1
         following = super().next_state(step)
         if not self._energies_follow_motion:
             following = min(following, self._next_energies(step))

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate import verdict as acceptance
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of
 from catenary.postproc.evaluate.wording import counted
@@ -26,8 +25,7 @@ from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.page import page, pdf, refuse_without_pdf
-from catenary.postproc.report.sections import acceptance as acceptance_section
-from catenary.postproc.report.sections import contact_force, dynamics, line, run_facts
+from catenary.postproc.report.sections import acceptance, contact_force, dynamics, line, run_facts
 from catenary.postproc.report.sections.section import (
     EvaluatedRun,
     Picture,
@@ -44,8 +42,8 @@ logger = logging.getLogger("catenary.report")
 
 # The sections of a report in their order.
 SECTIONS: list[SectionEntry] = [
-    SectionEntry("verdict", acceptance_section.status),
-    SectionEntry("acceptance", acceptance_section.section, has_train),
+    SectionEntry("verdict", acceptance.status),
+    SectionEntry("acceptance", acceptance.section, has_train),
     SectionEntry("checks", run_facts.checks),
     SectionEntry("force", contact_force.section, has_train),
     SectionEntry("spectrum", dynamics.section, dynamics.has_statistics, full=True),
@@ -161,8 +159,8 @@ def write_report(
     return Report(files, criteria, run.verdict if run.results.complete else None)
 
 
-def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
-    """Write ``summary.json`` of a run alone; returns the verdict as ``Report``. Not collective.
+def write_summary(result_path: Path | str, out_dir: Path | str) -> None:
+    """Write ``summary.json`` of a run alone. Not collective.
 
     Files of an earlier report are removed: they may tell of a run that has gone on since.
 
@@ -182,10 +180,8 @@ def write_summary(result_path: Path | str, out_dir: Path | str) -> bool | None:
         statistics = stats.evaluate(results)
         criteria = criteria_of(results, statistics)
         text = as_json(summarise(results, statistics, criteria))
-        verdict = acceptance.verdict(criteria) if results.complete else None
     write_into(Path(out_dir), {"summary.json": text})
     remove_stale(Path(out_dir), set(REPORT_FILES).difference(["summary.json"]))
-    return verdict
 
 
 def drawings(results: Results, statistics: RunStatistics) -> Iterator[Picture]:

@@ -251,9 +251,3 @@ def _columns_of_nodes(
     places = dofs, free[dofs].astype(float), wires.x[chosen]
     found = columns_of(line.responses, line.operators.in_pieces, places, put)
     return found.data, found.reach
-
-
-def _no_sideways() -> native.Sideways:
-    """Lateral data of a line without lateral motion, empty."""
-    nothing = np.zeros((0, 2))
-    return native.Sideways(nothing.astype(np.int64), nothing.astype(bool), nothing)

@@ -111,7 +111,6 @@ def _displaced(
     Slack droppers lack ``gap`` (n_droppers,) [m] of being taut; the taut line carries the force
     that they release as a load.
     """
-    assert taut.droppers is not None
     unknowns, weights = taut.droppers.direction
     lacks = taut.dropper_stiffness * gap
     load, released = np.zeros(taut.n_dofs), 1.0 - taut.simulated.kept_ratio

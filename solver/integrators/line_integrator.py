@@ -153,9 +153,9 @@ class LineIntegrator(ABC):
         if self.loads is not None:
             self.loads.read(motion)
 
+    @abstractmethod
     def _ahead(self) -> PredictedLineState | None:
         """A motion to keep ahead, in the arrays of this one; None if the method cannot."""
-        return None
 
     @property
     def displacement(self) -> np.ndarray:

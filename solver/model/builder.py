@@ -153,9 +153,8 @@ class ModelBuilder:
             droppers alone.
         """
         model, links = self.model, Links(component, direction, law, of_shape, bends)
-        if model.droppers is not None and component == model.droppers.component:
-            if (law["acts"] != BOTH).any():
-                raise ValueError(f"links of one sign need a name of their own, not {component}")
+        if component == DROPPERS and (law["acts"] != BOTH).any():
+            raise ValueError(f"links of one sign need a name of their own, not {component}")
         model.links.append(links)
         stiffness = links.stiffness_matrices
         self.add_elements(component, direction.unknowns, stiffness=stiffness, of_shape=of_shape)
@@ -181,7 +180,6 @@ class ModelBuilder:
     def _add_dampers(self, component: str, which: np.ndarray) -> None:
         """Dampers of droppers that are slack at rest and whose dampers act nevertheless."""
         model = self.model
-        assert model.droppers is not None
         unknowns, weights = (part[which] for part in model.droppers.direction)
         kept = (model.dropper_damping - model.released_damping)[which]
         lacking = (1.0 - model.simulated.kept_ratio) * kept

@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from catenary.meshgen.mesh import DROPPERS
+
 # Directions in which a link has a force: tension and compression, or one of both.
 BOTH, PULLS, PUSHES = 0, 1, 2
 # Force at rest [N], of an open link that of its spring drawn on through the gap; stiffness [N/m];
@@ -84,6 +86,15 @@ class Links:
         weights = self.direction.weights
         stiffness = np.where(self.law["open"], 0.0, self.law["stiffness"])
         return np.asarray(stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :])
+
+
+# Of a line to which none were added yet.
+NO_DROPPERS = Links(
+    DROPPERS,
+    Direction(np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1))),
+    np.zeros(0, dtype=LAW),
+    of_shape=True,
+)
 
 
 def law(

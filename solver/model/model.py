@@ -18,7 +18,7 @@ from catenary.meshgen.line import DropperPlace, droppers_at
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.model.alike import alike
-from catenary.solver.model.links import Links
+from catenary.solver.model.links import NO_DROPPERS, Links
 from catenary.solver.model.loads import Load
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.unknown_registry import Unknowns
@@ -166,7 +166,7 @@ class Model:
     cut_lengths: np.ndarray
     blocks: list[Block] = field(default_factory=list)
     links: list[Links] = field(default_factory=list)
-    droppers: Links | None = None
+    droppers: Links = NO_DROPPERS
     constrained: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     loads: list[Load] = field(default_factory=list)
     terms_of: dict[str, int] = field(default_factory=dict)

@@ -261,8 +261,6 @@ def _bends(links: Links, bends: Bends, alpha: np.ndarray, sign: np.ndarray) -> n
 def _dependents(model: Model) -> list[tuple[native.Links, np.ndarray]]:
     """Dependents of droppers that may slacken, and the numbers of these droppers."""
     found: list[tuple[native.Links, np.ndarray]] = []
-    if model.droppers is None:
-        return found
     for direction, stiffness in swings_of_droppers(model):
         own = np.flatnonzero((stiffness > 0.0) & ~model.broken & (model.dropper_gap <= 0.0))
         law = np.zeros(own.size, dtype=RESERVE)

@@ -259,8 +259,6 @@ def middle_span(line: Line) -> tuple[float, float]:
     """
     masts = line.support_positions
     first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
-    if last <= first:
-        first, last = 0, line.n_spans
     wires = np.zeros(line.n_spans)
     for piece in (piece for wire in line.wires_of(Role.CONTACT) for piece in wire.pieces):
         begun = masts[:-1] < piece.x[-1] + _SAME_PLACE

@@ -289,6 +289,7 @@ def test_what_runs_do_without_is_not_needed(monkeypatch: pytest.MonkeyPatch) -> 
         ("import no_such_module_at_all", "No module named", MISSING),
         ("raise ValueError('it is old')", "ValueError: it is old", BROKEN),
         ("import os; os.kill(os.getpid(), 11)", "ended by signal 11", BROKEN),
+        ("import os; os.kill(os.getpid(), 1)", "ended by signal 1", BROKEN),
         ("import time; time.sleep(60)", "no answer within 1 s", BROKEN),
         ("print('7.1', '\\n----')", "7.1", OK),
     ],
@@ -296,9 +297,7 @@ def test_what_runs_do_without_is_not_needed(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_part_that_fails_is_a_finding(
     monkeypatch: pytest.MonkeyPatch, program: str, facts: str, state: str
 ) -> None:
-    monkeypatch.setattr(installation._answer, "__defaults__", (1.0,))
-    if state == OK:
-        monkeypatch.setattr(installation._answer, "__defaults__", (30.0,))
+    monkeypatch.setattr(installation, "LIMIT", 30.0 if state == OK else 1.0)
     found = installation._tried("a part", program, "mend it", needed=True)
     assert found.state == state and facts in found.facts
     assert found.prevents_runs == (state != OK)

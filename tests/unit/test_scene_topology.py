@@ -117,6 +117,14 @@ def test_a_table_that_does_not_fit_is_refused_in_one_sentence(name: str) -> None
     assert re.search(expected, fault.sentence), fault.sentence
 
 
+def test_droppers_may_be_as_near_to_each_other_as_the_refusal_says() -> None:
+    """10.001 - 10 is less than 0.001 in binary numbers."""
+    at_will = [f"line.dropper.{key}=" for key in ("count", "spacing_m", "pre_sag_mm")]
+    load_scene("ac_simple", [*at_will, "line.dropper.positions_m=[10, 10.001]"])
+    with pytest.raises(SceneError, match="10 and 10.0009 m; they must be at least 0.001 m apart"):
+        load_scene("ac_simple", [*at_will, "line.dropper.positions_m=[10, 10.0009]"])
+
+
 def rest_of(case: str, changes: list[str]) -> LineAtRest:
     """A shortened case at rest."""
     scene = load_scene(case, changes, shortened=True)

@@ -302,7 +302,7 @@ def test_what_is_never_lost_and_what_is_lost_already(evaluated: Any) -> None:
     evaluated(lambda scene: 31.0)
     (lost,) = find_tolerances(plan)
     assert lost.level == 0.0 and lost.kept == 0
-    assert draw_shares(plan, [lost]) is None and draw_values(plan, [lost]) is None
+    assert draw_shares(plan, [lost]) is None and draw_values([lost]) is None
     assert "not kept without errors" in as_text(plan, [lost])
 
 
@@ -407,7 +407,7 @@ def test_pictures_show_the_samples_of_all_levels(evaluated: Any) -> None:
     assert lines["90 % of all lines"].get_color() == axes.lines[-1].get_color()
     assert axes.get_title(loc="left") == f"speed, std_N <= 30: {found.level:.3g} km/h"
 
-    values = draw_values(plan, [found])
+    values = draw_values([found])
     assert values is not None
     (axes,) = values.axes
     lines = {line.get_label(): line for line in axes.lines}

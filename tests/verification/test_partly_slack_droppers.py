@@ -189,7 +189,6 @@ def leaning_dropper(dt: float) -> tuple[np.ndarray, np.ndarray]:
         numerics=numerics(dt),
     )
     model, _ = find_form(problem, mesh_of(line, 3))
-    assert model.droppers is not None
     kinds = [model.droppers.direction, *(swing for swing, _ in swings_of_droppers(model))]
     stiffness = [model.dropper_stiffness, *(pull for _, pull in swings_of_droppers(model))]
     number = 2

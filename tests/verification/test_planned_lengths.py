@@ -43,6 +43,17 @@ def cut(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return x, lengths[own][first]
 
 
+def test_a_fitting_of_next_to_no_mass_changes_no_length() -> None:
+    """On a wire of several pieces: its node is one more in one of them, and parts none."""
+    light = 1e-9  # [kg], of 0.1 kg of wire between two droppers: a hundred-millionth of the sag
+    at = [f'{{kind="splice", wire="stitch_wire", at_m={x}, mass_kg={light}}}' for x in (60, 128.5)]
+    words = [f"line.fittings=[{', '.join(at)}]"]
+    (_, plain), (_, fitted) = (
+        cut(load_scene("re330_stitched", own, shortened=True)) for own in ([], words)
+    )
+    check("lengths [m]", fitted, plain, within=1e-8 * 0.05)
+
+
 def planned(folder: Path, case: str, longer: dict[tuple[int, int], float] | None = None) -> Scene:
     """Tables of a shipped line's first spans with lengths of its droppers; the line itself."""
     words = [f"line.n_spans={N}", "evaluation.from_m=350", "evaluation.to_m=450"]

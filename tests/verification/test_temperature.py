@@ -203,7 +203,7 @@ def test_energy_stays_where_droppers_lean() -> None:
     line = line_that_leans()
     model, form = at(line, AlongTrack(end=True, warmer=50.0))
     assert form.leaning(model.mesh.droppers).any()
-    assert model.droppers is not None and model.droppers.direction.unknowns.shape[1] == 4
+    assert model.droppers.direction.unknowns.shape[1] == 4
     struck = np.zeros(model.n_dofs)
     struck[model.dofs(model.mesh.droppers[4, 1])] = 1.0
     n_steps = 2000

@@ -11,8 +11,11 @@ from scenes import load_scene, problem_of
 
 from catenary import InputError
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, stand
+from catenary.mbs.rigid.bodies import Body
 from catenary.mbs.rigid.forces import PointForce
+from catenary.mbs.rigid.joints import Constant, PointOnCurve, PrescribedPoint
 from catenary.mbs.rigid.reversed_system import turned_round
+from catenary.mbs.rigid.system import System
 
 EPS = np.finfo(float).eps
 KNEE = (-0.820, 0.0, 0.0)
@@ -70,6 +73,17 @@ def test_twice_turned_round_is_as_before() -> None:
         check("turn", body.turn, before.turn, within=2 * EPS)
     assert again.joints[1:] == system.joints[1:]
     assert again.forces == system.forces
+
+
+def test_guides_and_pushers_in_space_turn_with_the_bodies() -> None:
+    """A block on a bent guide, pushed to a coordinate that is along no axis of the turn."""
+    block = Body("block", 2.0, (0.1, 0.2, 0.3), position=(0.6, 0.2, 1.3))
+    guide = PointOnCurve("guide", "block", (-1.0, 0.0, 2.0), (0.0, 0.1, 0.5), (1.0, 1.2, 2.0))
+    pusher = PrescribedPoint("pusher", "block", Constant(0.5), along=(1.0, 0.5, 0.2))
+    system = System((block,), (guide, pusher))
+    one, other = (own.assemble(own.start()).position[0] for own in (system, turned_round(system)))
+    assert np.abs(one[:2]).min() > 0.05
+    check("place of the block [m]", other, one * [-1.0, -1.0, 1.0], within=1e-12)
 
 
 def test_lumped_masses_have_no_front() -> None:

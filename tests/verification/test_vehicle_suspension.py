@@ -156,3 +156,18 @@ def test_a_random_track_reaches_the_roof_by_the_transfer_function() -> None:
     # In terms of one number, of the waves that both accelerations are sums of.
     rough, smooth = (np.linalg.norm(of * wave_numbers**2 * amplitudes) for of in (1.0, passed))
     assert smooth < 0.1 * rough  # what suspensions are for
+
+
+def test_without_data_sideways_the_roof_follows_the_track_there() -> None:
+    """A table follows its spline, through points 0.1 m apart."""
+    upward_only = replace(ON_TRACK, sideways=None)
+    bend = Table((0.0, 40.0, 80.0, 200.0), (0.0, 0.01, -0.02, 0.0), along_track=True)
+    for track in (Irregularity("german_low", 3.0, 100.0, seed=3), bend):
+        rigid = VehicleMotion((), (track,))
+        expected, found = (
+            BaseMotion(motion, 50.0, SPEED).lateral(1.1)
+            for motion in (rigid, replace(rigid, suspension=upward_only))
+        )
+        assert abs(expected.place) > 1e-4
+        check("place [m]", found.place, expected.place, within=1e-12)
+        check("velocity [m/s]", found.velocity, expected.velocity, within=1e-10)

@@ -106,7 +106,7 @@ def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
         "warnings": [
             *end_warnings(problem),
             *_reflections(scene, traced),
-            *_short_run_in(scene, problem, traced),
+            *_short_run_in(problem, traced),
             *_short_stretch(problem, traced),
         ],
     }
@@ -276,7 +276,7 @@ def _reflections(scene: Scene, traced: Traced) -> list[str]:
     return sentences
 
 
-def _short_run_in(scene: Scene, problem: Problem, traced: Traced) -> list[str]:
+def _short_run_in(problem: Problem, traced: Traced) -> list[str]:
     speed, line = problem.train.speed, traced.line
     short = [i for i, found in enumerate(traced.found) if found.start_share > SHORT_RUN_IN]
     if not short:

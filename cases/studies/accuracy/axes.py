@@ -329,12 +329,10 @@ _ONE_SOLVE = ("numerics.iterations=", "numerics.scheme=one_solve")
 # below tolerances, of which the loosest end every step after the first.
 _PAPER = ("numerics.coupling=", "numerics.iterations=", "numerics.scheme=fixed_point")
 _LOOSENESS = ((1e-2, 1.0), (1e-4, 1e-1), (1e-5, 1e-2), (1e-7, 1e-4))
-
-
 _TOLERANCES: tuple[str, ...] = ("eps_d_m", "eps_v_m_per_s", "eps_force_N", "max_iterations")
 
 
-def _without_tolerances(scene: Scene, of: tuple[str, ...] = _TOLERANCES) -> tuple[str, ...]:
+def _without_tolerances(scene: Scene, of: tuple[str, ...]) -> tuple[str, ...]:
     """Removes the tolerances of iterations from a level that does not iterate."""
     return tuple(f"numerics.{name}=" for name in of if name in scene.numerics.model_fields_set)
 

@@ -76,7 +76,7 @@ def advice(found: Costs, row: Measured) -> str:
     change = largest(found, row)
     if change is None:
         return f"it {_price(row.cost)}; the stretch gives no figures to compare."
-    what = _words(found, change, row.switch.on)
+    what = _words(found, change)
     if abs(change.share) >= found.options.tolerance:
         if row.switch.on:
             return f"it {_price(row.cost)}; without it {what}: keep it."
@@ -95,7 +95,7 @@ def _price(cost: float) -> str:
     return f"makes a step {cost:.2f} times as long"
 
 
-def _words(found: Costs, change: Change, on: bool) -> str:
+def _words(found: Costs, change: Change) -> str:
     whose = f" of {found.names[change.pantograph]}" if len(found.names) > 1 else ""
     what = _WORDS[change.figure] + (whose if change.figure != UPLIFT else "")
     if math.isinf(change.share):

@@ -83,7 +83,6 @@ class LineBalance:
         self._loads = LineLoads(outer, whole, model.constrained) if outer else None
         steepest = model.dropper_slopes.slope.max(axis=1, initial=0.0)
         self._share = 0.5 * steepest * ((1.0 - gamma) * dt) ** 2
-        assert model.droppers is not None
         self._along = model.droppers.direction
         self._rest = model.dropper_slopes.stretch_under(tension)
         hangs = (model.dropper_gap <= 0.0) & ~model.broken

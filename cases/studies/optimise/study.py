@@ -12,7 +12,6 @@ from catenary.base.errors import InputError
 from catenary.cases.process.workers import Pool
 from catenary.cases.scene.input.toml_input import REMOVED, parse_assignment, value_at
 from catenary.cases.scene.load import Draft
-from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import FORWARD, has_mirrored_line, turned
 from catenary.cases.studies.optimise.checks import (
     AS_IS,
@@ -47,11 +46,6 @@ class Plan:
     variables: Variables
     checks: Mapping[str, SceneSet]
     warnings: Sequence[str]
-
-    @property
-    def scene(self) -> Scene:
-        """The case as shipped, whole."""
-        return self.checks[AS_IS].draft.scene()
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ def files_of(plan: Plan, found: Sequence[Tolerance]) -> dict[str, Content]:
         RECORD: record,
         PAGE: markdown(plan, found),
         SHARES: partial(draw_shares, plan, found),
-        VALUES: partial(draw_values, plan, found),
+        VALUES: partial(draw_values, found),
     }
 
 

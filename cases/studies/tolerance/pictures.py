@@ -113,7 +113,7 @@ def _draw_share(
 
 
 @figures.own_style()
-def draw_values(plan: Plan, found: Sequence[Tolerance]) -> Figure | None:
+def draw_values(found: Sequence[Tolerance]) -> Figure | None:
     """Worst value of each criterion of all samples over the level beside its limit, a row of panels
     for each error.
 

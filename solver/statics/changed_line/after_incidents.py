@@ -156,7 +156,6 @@ def _about_rest(
     model = build(
         changed.problem, changed.mesh, lengths, changed.broken, about, gap, cut_lengths=cut
     )
-    assert model.droppers is not None
     unknowns, weights = model.droppers.direction
     k, moved = model.dropper_stiffness, rest.moved
     stretched = k * (weights * moved[unknowns]).sum(axis=1)
@@ -234,7 +233,6 @@ def _compensation(line: ChangedLine, displacement: np.ndarray, velocity: np.ndar
 
 def _droppers(model: Model, which: np.ndarray) -> Direction:
     """Directions of some of the droppers, ``which`` (n_droppers,) bool."""
-    assert model.droppers is not None
     unknowns, weights = model.droppers.direction
     return Direction(unknowns[which], weights[which])
 

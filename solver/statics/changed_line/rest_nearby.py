@@ -310,7 +310,6 @@ class RestNearby:
         try:
             if not changed.any():
                 return self._stiff.moved(lacks)
-            assert about.droppers is not None
             unknowns, weights = (part[changed] for part in about.droppers.direction)
             rows = np.repeat(np.arange(len(unknowns)), unknowns.shape[1])
             shape = len(unknowns), about.n_dofs

@@ -67,7 +67,6 @@ def hang(
     depends = effects.needs_form(problem) or model.droppers_bend or springless is not problem
     if not (depends or rest.gap.any() or moved_stops):
         model.form = rest.form
-        assert model.droppers is not None
         if all(map(np.array_equal, dropper_directions(model), model.droppers.direction)):
             return model, rest.form  # no matrix depends on the shape
     hung = build(problem, mesh, length, form=rest.form, gap=rest.gap, cut_lengths=wanted)

@@ -114,16 +114,14 @@ def _carried(model: Model, radial: np.ndarray, arm_lift: np.ndarray) -> np.ndarr
             force[mine] = pull * np.tan(kind.inclination)
         elif kind.holds_height:
             force[mine] = arm_lift[mine]
-            _check_slope(model, arms, pull, arm_lift[mine], mesh.x(mesh.steady_arms[mine]))
+            _check_slope(arms, pull, arm_lift[mine], mesh.x(mesh.steady_arms[mine]))
         else:
             weight = model.simulated.gravity * model.hanging_at_arms[mine]
             force[mine] = np.minimum(weight, pull * np.tan(STEEPEST))
     return force
 
 
-def _check_slope(
-    model: Model, arms: SteadyArms, pull: np.ndarray, lift: np.ndarray, x: np.ndarray
-) -> None:
+def _check_slope(arms: SteadyArms, pull: np.ndarray, lift: np.ndarray, x: np.ndarray) -> None:
     steep = np.flatnonzero(np.abs(lift) > pull * np.tan(_UPRIGHT))
     if steep.size:
         i = steep[0]

@@ -38,7 +38,7 @@ class Part(NamedTuple):
         return Part(self.dofs[which], self.matrices, self.kind[which])
 
 
-def wire_parts(model: Model, at: np.ndarray, exact: bool = False) -> list[Part]:
+def wire_parts(model: Model, at: np.ndarray, exact: bool) -> list[Part]:
     """Bending and tension of all wires.
 
     Parameters
@@ -47,7 +47,7 @@ def wire_parts(model: Model, at: np.ndarray, exact: bool = False) -> list[Part]:
         Discrete line.
     at : ndarray, shape (n_nodes,)
         Number of each node's deflection; that of its slope follows.
-    exact : bool, optional
+    exact : bool
         Whether elements bend as tensioned beams do, or by Hermite's functions as in motion.
     """
     mesh, parts = model.mesh, []
