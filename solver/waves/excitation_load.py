@@ -14,7 +14,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.waves.excitation import Blow, Excitation
 
 # Points in time by which half a sine or a whole cosine is drawn.
-_POINTS = 41
+_POINTS = 641
 
 
 def load_of(excitation: Excitation, model: Model, interval: float) -> Load:

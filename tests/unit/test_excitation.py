@@ -62,9 +62,9 @@ def test_a_hammer_has_its_impulse_and_a_pulse_its_force() -> None:
         n = load.factor.numbers.size // 2
         times, values = load.factor.numbers[:n], load.factor.numbers[n:]
         assert values[0] == 0.0 and abs(values[-1]) < 1e-12 and values.max() == pytest.approx(1.0)
-        # Lines between 41 points: (pi / 40)^2 / 12 of half a sine, less of a whole cosine.
+        # Lines between 641 points: (pi / 640)^2 / 12 of half a sine, less of a whole cosine.
         assert blow.peak * 0.5 * (values[1:] + values[:-1]) @ np.diff(times) == pytest.approx(
-            blow.impulse, rel=6e-4
+            blow.impulse, rel=3e-6
         )
 
 

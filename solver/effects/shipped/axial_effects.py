@@ -115,7 +115,7 @@ def _tensioners(builder: ModelBuilder) -> None:
 
 def _add_friction(builder: ModelBuilder, ends: list[wire_ends.WireEnd]) -> None:
     """Dry friction of wheels: a damper that slips where the tension leaves the band of a wheel that
-    stands. While one stands it creeps, by ``CREEP`` at the most."""
+    stands. While one stands it creeps, by ``CREEP`` where half the band is used."""
     model, problem = builder.model, builder.problem
     tensioner = model.simulated.tensioner
     assert tensioner is not None
