@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 
-#include "base/inverse.hpp"
 #include "heads/head.hpp"
 
 namespace catenary {

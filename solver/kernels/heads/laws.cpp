@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "base/inverse.hpp"
-
 namespace catenary {
 
 namespace {
