@@ -2,7 +2,7 @@
 // Sums of columns of A^-1, the influence functions of unit forces, which vanish outside of windows.
 #include "base/arrays.hpp"
 #include "contact/touch.hpp"
-#include "motion/state.hpp"
+#include "motion/motion.hpp"
 
 namespace catenary {
 

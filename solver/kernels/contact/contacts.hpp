@@ -3,7 +3,7 @@
 // functions, columns of A^-1).
 #include "base/arrays.hpp"
 #include "contact/touch.hpp"
-#include "motion/links.hpp"
+#include "motion/motion.hpp"
 
 namespace catenary {
 

@@ -7,8 +7,7 @@
 #include "line/gusts.hpp"
 #include "loads/fourier.hpp"
 #include "loads/loads.hpp"
-#include "motion/links.hpp"
-#include "motion/shown.hpp"
+#include "motion/motion.hpp"
 #include "motion/window.hpp"
 #include "python/from_python.hpp"
 

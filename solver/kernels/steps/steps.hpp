@@ -8,7 +8,7 @@
 #include "contact_problem/forces.hpp"
 #include "heads/head.hpp"
 #include "loads/loads.hpp"
-#include "motion/shown.hpp"
+#include "motion/motion.hpp"
 #include "motion/two_passes.hpp"
 
 namespace catenary {
