@@ -3,7 +3,7 @@
 // the lowering under way until the head is caught, see mbs/lowering.py.
 #include <vector>
 
-#include "contact/touch.hpp"
+#include "contact/contacts.hpp"
 #include "heads/laws.hpp"
 
 namespace catenary {

@@ -1,6 +1,5 @@
 // Python bindings of contacts, and of the small problem of a step.
 #include "contact/contacts.hpp"
-#include "contact/outputs.hpp"
 #include "contact/response.hpp"
 #include "contact_problem/forces.hpp"
 #include "contact_problem/simplicial_path.hpp"

@@ -3,7 +3,7 @@
 // problem of contact forces and switching links, and the motion of line and pantographs by both.
 #include <optional>
 
-#include "contact/outputs.hpp"
+#include "contact/contacts.hpp"
 #include "contact/response.hpp"
 #include "contact_problem/forces.hpp"
 #include "heads/head.hpp"
