@@ -5,7 +5,7 @@
 
 #include "contact/contacts.hpp"
 #include "contact/response.hpp"
-#include "contact_problem/forces.hpp"
+#include "contact_problem/small_problem.hpp"
 #include "heads/head.hpp"
 #include "loads/loads.hpp"
 #include "motion/motion.hpp"
