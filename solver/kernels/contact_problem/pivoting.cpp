@@ -1,5 +1,5 @@
-// LU factors of the rows that act, the active-set iteration, Merrill's path of simplices, grid after
-// grid, Murty's least-index pivoting, and shares of dependents by simplicial paths.
+// LU factors of the rows that act, the active-set iteration, Merrill's path of simplices, grid
+// after grid, Murty's least-index pivoting, and shares of dependents by simplicial paths.
 #include "contact_problem/pivoting.hpp"
 
 #include <algorithm>

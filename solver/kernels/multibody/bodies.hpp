@@ -1,7 +1,7 @@
 #pragma once
-// Rigid bodies in space: where n bodies are and how they move, the frame at rest being one more; and
-// rows of joints and lines of forces between them, all of a system at once. These know nothing of
-// joints or forces by name; see mbs/rigid/arrays.py.
+// Rigid bodies in space: where n bodies are and how they move, the frame at rest being one more;
+// and rows of joints and lines of forces between them, all of a system at once. These know nothing
+// of joints or forces by name; see mbs/rigid/arrays.py.
 #include <array>
 #include <vector>
 
