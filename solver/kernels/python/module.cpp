@@ -14,7 +14,6 @@ void offer_stations(py::module_& module);
 void offer_contact(py::module_& module);
 void offer_steps(py::module_& module);
 void offer_heads(py::module_& module);
-void offer_ensemble(py::module_& module);
 
 namespace {
 
@@ -74,7 +73,6 @@ PYBIND11_MODULE(native, module) {
     offer_contact(module);
     offer_steps(module);
     offer_heads(module);
-    offer_ensemble(module);
 }
 
 }  // namespace catenary::python
