@@ -30,7 +30,7 @@ from catenary.solver.model.links import BOTH, NO_BENDS, PUSHES, Bends, Links
 from catenary.solver.model.model import Model
 
 _SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
-# Parts of a link's reserve, and its law beyond; see `kernels/motion/links.hpp`.
+# Parts of a link's reserve, and its law beyond; see `kernels/motion/motion.hpp`.
 RESERVE = native.RESERVE
 
 

@@ -1,8 +1,10 @@
 #pragma once
 // Arrays of others, which these do not own: std::span of one dimension, and more below; and records
 // of arrays, which Python fills in by the names of their members. Bounds are checked where
-// _GLIBCXX_ASSERTIONS is defined, as by `make sanitize`.
+// _GLIBCXX_ASSERTIONS is defined, and numbers where CATENARY_CHECKS is, as by `make sanitize`.
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <span>
 #include <stdexcept>
 #include <tuple>
@@ -15,7 +17,8 @@
         return std::tie(__VA_ARGS__);                     \
     }
 
-/// Shapes that arrays from Python must have, member by member, in the words of python/shapes.hpp.
+/// Shapes that arrays from Python must have, member by member, in the words of
+/// python/from_python.hpp.
 #define CATENARY_SHAPES(shapes) static constexpr const char* kShapes = shapes;
 
 namespace catenary {
@@ -74,5 +77,36 @@ concept RecordType = requires(T record) {
 /// One of these arrays of more than one dimension.
 template <class T>
 concept TableType = requires(T table) { table.sizes(); };
+
+/// Invert in place a matrix (n, n) that needs no exchange of rows: a positive definite one, or one
+/// whose masses outweigh all else.
+inline void invert(Array2<double> matrix) {
+    const int64_t n = matrix.rows;
+    for (int64_t k = 0; k < n; ++k) {
+        const auto row = matrix[k];
+        const double pivot = 1.0 / row[k];
+        row[k] = 1.0;
+        for (int64_t j = 0; j < n; ++j) row[j] *= pivot;
+        for (int64_t i = 0; i < n; ++i) {
+            if (i == k) continue;
+            const auto other = matrix[i];
+            const double share = other[k];
+            other[k] = 0.0;
+            for (int64_t j = 0; j < n; ++j) other[j] -= share * row[j];
+        }
+    }
+}
+
+/// End the program, with a sentence, if one of these is no finite number.
+inline void check_numbers([[maybe_unused]] std::span<const double> numbers,
+                          [[maybe_unused]] const char* of) {
+#ifdef CATENARY_CHECKS
+    for (size_t i = 0; i < numbers.size(); ++i)
+        if (numbers[i] - numbers[i] != 0.0) {  // infinity less itself is no number
+            std::fprintf(stderr, "catenary: number %zu of %s is %g\n", i, of, numbers[i]);
+            std::abort();
+        }
+#endif
+}
 
 }  // namespace catenary

@@ -1,11 +1,68 @@
 #pragma once
-// Contacts of a rank's part of a line: their places, and answers to forces there (influence
-// functions, columns of A^-1).
+// Contacts of a rank's part of a line: places of strips on contact wires, answers to forces there
+// (influence functions, columns of A^-1, which vanish outside of windows), and outputs of
+// pantographs and strips.
 #include "base/arrays.hpp"
-#include "contact/touch.hpp"
-#include "motion/links.hpp"
+#include "motion/motion.hpp"
 
 namespace catenary {
+
+/// Far more than the round-off of a position, far less than an element [m].
+inline constexpr double kSlip = 1e-6;
+
+/// A node of a contact wire. As short as can be, since a line has very many.
+struct Node {
+    double x, y;       ///< along the track and across it [m]
+    double rest[2];    ///< its unknowns (w, theta_y) at rest [m], [-]
+    int64_t at;        ///< where its columns of A^-1 for both begin, one after the other
+    int32_t begin;     ///< the first local unknown of both columns
+    int32_t width;     ///< how long each of them is
+    int32_t local[2];  ///< numbers of its unknowns on this rank, 0 where another one owns them
+    int8_t owned[2];   ///< whether this rank does
+    int8_t joined;     ///< whether an element joins it to the next one
+};
+
+/// A sample of the running surface of a contact wire.
+struct Sample {
+    double x, height, slope;  ///< along the track [m], above the wire's axis [m], [-]
+};
+
+/// A place of a strip on a contact wire, which is a candidate for a contact.
+struct Touch {
+    int64_t first, end;  ///< the wire's first node, and the one after its last
+    double half_length;  ///< of the strip [m]
+    double present;      ///< 1 if the wire is there on the strip, else 0: so are all functions then
+    double x;            ///< along the track [m]
+    int64_t element;     ///< first node of its element
+    int64_t local[4];    ///< numbers of the element's unknowns on this rank, 0 where not owned
+    double value[4];     ///< Hermite functions N of them, 0 where not owned
+    double slope[4];     ///< dN/dx [1/m], 0 where not owned
+    double whole_value[4];  ///< N and dN/dx without regard to owners
+    double whole_slope[4];
+    double rest[4];      ///< the unknowns at rest [m], [-]
+    int64_t samples[2];  ///< first sample of the wire's running surface, and the one after its last
+    int64_t sample;      ///< the sample before the place
+    double surface[2];   ///< height [m] and slope [-] of the running surface here
+    int64_t filled[2];  ///< first and one after the last local unknown that answers to a force here
+};
+
+/// Lateral motion of wires at n contacts: place y + v [m], its total rate
+/// dv/dt + V (dy/dx + dv/dx) [m/s] and displacement v [m]. Empty without lateral motion.
+struct Across {
+    std::span<double> place, rate, moved;
+    CATENARY_RECORD(place, rate, moved)
+    CATENARY_SHAPES("n, n, n")
+};
+
+/// Heights and their rates at n contacts: `place` (n,) [m] and `rate` (n,) [m/s] without forces,
+/// `by_force` (n, n) [m/N] and `rate_by_force` (n, n) [m/(N s)]: their increase by forces
+/// for a line, their decrease for heads and depths.
+struct Affine {
+    std::span<double> place, rate;
+    Array2<double> by_force, rate_by_force;
+    CATENARY_RECORD(place, rate, by_force, rate_by_force)
+    CATENARY_SHAPES("n, n, n n, n n")
+};
 
 /// Contact wires: their nodes, wire by wire, and samples of their running surfaces, ascending in
 /// each wire, none of a wire that has none.
@@ -124,5 +181,52 @@ void begin_work(const Contacts& contacts);
 /// Add the work that contact forces (n,) [N] have done in the step which has ended. The wire's own
 /// velocity counts, without the convective part: the train pays for that part.
 void add_work(const Contacts& contacts, std::span<const double> force);
+
+/// First contact of each strip, first strip of each pantograph, and the number of all at the end:
+/// (n_strips + 1,), (n_pantographs + 1,).
+struct StripEnds {
+    std::span<const int64_t> of_strip, of_pantograph;
+    CATENARY_RECORD(of_strip, of_pantograph)
+    CATENARY_SHAPES("s+1, p+1")
+};
+
+/// Contact force [N], head height and wire height [m] of each pantograph, the force of each strip,
+/// and, of several contact wires, that on each wire from each pantograph [N], pantograph by
+/// pantograph; empty of a single one.
+struct TrainOutputs {
+    StripEnds ends;
+    std::span<double> contact_force, head_height, wire_height, strip_force, contact_wire_force;
+    CATENARY_RECORD(ends, contact_force, head_height, wire_height, strip_force, contact_wire_force)
+    CATENARY_SHAPES("s=s p=p, p, p, p, s, *")
+};
+
+/// Fill in the outputs from n contacts: `force` (n,) and `reported` force (n,) [N], `heads` as
+/// functions of forces, `depth` (n,) [m]. A pantograph's force is the sum over its contacts,
+/// heights are means over its strips; of several wires over a strip the lowest counts.
+void write_outputs(const TrainOutputs& outputs, std::span<const double> force,
+                   std::span<const double> reported, const Affine& heads,
+                   std::span<const double> depth);
+
+/// How far contacts of m raked strips are ahead of the strip's middle, straight between points.
+struct Leads {
+    std::span<const int64_t> contact;  ///< (m,) numbers of the contacts
+    std::span<const int64_t> first;    ///< (m + 1,) where the points of each begin
+    std::span<const double> middle;    ///< of the strip along the track [m], ascending for each
+    std::span<const double> lead;      ///< how far the contact is ahead of it [m]
+    CATENARY_RECORD(contact, first, middle, lead)
+    CATENARY_SHAPES("m, m+1, k, k")
+};
+
+/// Contacts and then pantographs along the track [m]: at the start, now.
+struct TrainPlaces {
+    std::span<const double> start;
+    std::span<double> now;
+    Leads leads;
+    CATENARY_RECORD(start, now, leads)
+    CATENARY_SHAPES("n, n")
+};
+
+/// Move all a way [m] ahead of where they started.
+void move_contacts(const TrainPlaces& places, double way);
 
 }  // namespace catenary

@@ -59,9 +59,4 @@ struct Share {
 /// Fill in a rank's share; the motion is that without forces of contacts and of links that switch.
 void respond(const Contacts& contacts, const Share& share);
 
-/// Fill in a row for each link that may switch within the bounds of a share, as far as rows fit;
-/// rows of dependents follow their leaders'. Contacts act on links within reach only. Returns the
-/// number of these links, dependents included; -1 if a reserve is not finite.
-int64_t watch(const Contacts& contacts, const Share& share);
-
 }  // namespace catenary

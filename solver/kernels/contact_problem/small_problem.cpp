@@ -1,13 +1,61 @@
-// The matrix of the small problem from influence coefficients, and depths under its solution.
+// Tangents of Hertz's law with hysteresis, reported forces, the matrix of the small problem from
+// influence coefficients, depths under its solution, and forces of a step by tangents of the law.
 #include "contact_problem/small_problem.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace catenary {
 
+void linearise(const MarchedHertzLaw& marched, std::span<const double> depth,
+               std::span<const double> rate) {
+    const auto& [law, speed, tangents, force] = marched;
+    for (size_t i = 0; i < depth.size(); ++i) {
+        double &offset = tangents.offset[i], &by_depth = tangents.by_depth[i],
+               &by_rate = tangents.by_rate[i];
+        const double d = depth[i];
+        if (d <= 0.0) {
+            offset = by_depth = by_rate = force[i] = 0.0;
+            continue;
+        }
+        const double spring = law.stiffness * std::pow(d, law.exponent);
+        const double loss = 1.0 + law.hysteresis * rate[i] / speed[i];
+        force[i] = spring * loss;
+        // Beyond the speed at which the law would pull it has no spring either.
+        by_depth = law.exponent * spring / d * loss;
+        if (by_depth < 0.0) by_depth = 0.0;
+        by_rate = spring * law.hysteresis / speed[i];
+        offset = force[i] - by_depth * d - by_rate * rate[i];
+    }
+}
+
+void remember(const MarchedHertzLaw& marched, std::span<const double> depth,
+              std::span<const double> rate) {
+    for (size_t i = 0; i < depth.size(); ++i)
+        if (depth[i] <= 0.0) marched.speed[i] = std::max(rate[i], marched.law.least_speed);
+}
+
 namespace {
+
+/// Whether the contact law holds for forces (n,) at `time` [s]; if so they are remembered. A law
+/// with gamma > 0 reports their mean over the step.
+bool report(double time, std::span<const double> force, const ReportedForces& law) {
+    if (law.gamma == 0.0) {
+        std::ranges::copy(force, law.reported.begin());
+        return true;
+    }
+    auto mean = [&](size_t i) { return law.gamma * force[i] + (1.0 - law.gamma) * law.latest[i]; };
+    if (time > law.from_time)
+        for (size_t i = 0; i < force.size(); ++i)
+            if (mean(i) < 0.0) return false;
+    for (size_t i = 0; i < force.size(); ++i) {
+        law.reported[i] = mean(i);
+        law.latest[i] = force[i];
+    }
+    return true;
+}
 
 /// Whether contact forces (n,) alone take any of the first `count` links beyond its reserve.
 bool any_switched(const LinkRows& rows, int64_t count, const Coupled& coupled,
@@ -48,6 +96,17 @@ void couple(const LinkRows& rows, int64_t count, const Coupled& coupled,
     }
 }
 
+void press(const Affine& gap, const Tangents& tangents, const Room& room) {
+    const auto& [own, offset, by_depth, by_rate] = tangents;
+    const auto& [depth, rate, by_force, rate_by_force] = gap;
+    for (int64_t i = 0; i < size(depth); ++i) {
+        room.right[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i];
+        for (int64_t j = 0; j < size(depth); ++j)
+            room.matrix(i, j) = by_depth[i] * by_force(i, j) + by_rate[i] * rate_by_force(i, j);
+        room.matrix(i, i) += own[i];
+    }
+}
+
 bool subtract(const Affine& heads, const Affine& line, std::span<const double> present,
               const Affine& gap) {
     double total = 0.0;
@@ -64,17 +123,6 @@ bool subtract(const Affine& heads, const Affine& line, std::span<const double> p
         }
     }
     return std::isfinite(total);
-}
-
-void press(const Affine& gap, const Tangents& tangents, const Room& room) {
-    const auto& [own, offset, by_depth, by_rate] = tangents;
-    const auto& [depth, rate, by_force, rate_by_force] = gap;
-    for (int64_t i = 0; i < size(depth); ++i) {
-        room.right[i] = offset[i] + by_depth[i] * depth[i] + by_rate[i] * rate[i];
-        for (int64_t j = 0; j < size(depth); ++j)
-            room.matrix(i, j) = by_depth[i] * by_force(i, j) + by_rate[i] * rate_by_force(i, j);
-        room.matrix(i, i) += own[i];
-    }
 }
 
 Found slack_under(const LinkRows& rows, int64_t count, const Coupled& coupled,
@@ -166,6 +214,102 @@ Solved solve(const SmallProblem& problem) {
     finite = under(gap, rows, force, compensation, found) && finite;
     const bool complete = !leaves_out(force, compensation, rows, share.bounds, coupled);
     return {forces.rounds, used, finite, complete, forces.pivoted};
+}
+
+namespace {
+
+/// Largest difference between the law and its last tangent, relative to the force.
+constexpr double kTolerance = 1e-10;
+/// How well depths [m] and rates [m/s] are known: differences of heights of 5 m and of speeds of
+/// some m/s, a few roundings of 4e-16 to 9e-16 each. No force is known better than that times the
+/// slope.
+constexpr double kKnown = 5e-15;
+/// Where so many tangents do not do, the tolerance takes in round-off: large terms may cancel in
+/// depths and rates, and each term is known to some roundings of itself.
+constexpr int64_t kUsualTangents = 12;
+constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
+
+/// Whether contact forces and compensations that were found with tangents agree with the law, which
+/// was linearised under them since; `number` tangents did not do before.
+bool agrees(const Affine& gap, const LinkRows& rows, std::span<const double> force,
+            std::span<const double> compensation, const MarchedHertzLaw& law, int64_t number) {
+    const int64_t n = size(force);
+    for (int64_t i = 0; i < n; ++i) {
+        double depth = 0.0, rate = 0.0;
+        if (number >= kUsualTangents) {
+            depth = std::abs(gap.place[i]);
+            rate = std::abs(gap.rate[i]);
+            for (int64_t j = 0; j < n; ++j) {
+                depth += std::abs(gap.by_force(i, j) * force[j]);
+                rate += std::abs(gap.rate_by_force(i, j) * force[j]);
+            }
+            for (int64_t k = 0; k < size(compensation); ++k) {
+                depth += std::abs(rows.lift(k, i) * compensation[k]);
+                rate += std::abs(rows.rise(k, i) * compensation[k]);
+            }
+        }
+        const double wanted = std::max(law.there[i], 0.0);
+        const double within = kTolerance * (1.0 + wanted) +
+                              (kKnown + kRounding * depth) * law.tangents.by_depth[i] +
+                              (kKnown + kRounding * rate) * law.tangents.by_rate[i];
+        if (!(std::abs(wanted - force[i]) <= within)) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+Solved solve(const SmallProblem& problem, const std::optional<MarchedHertzLaw>& marched) {
+    if (!marched) return solve(problem);
+    const MarchedHertzLaw& law = *marched;
+    const auto& [depth, rate] = problem.found;
+    const Affine& gap = problem.gap;
+    const auto force = problem.room->solution.first(depth.size());
+    Solved solved{};
+    // Without a force heads stand highest: from there Newton's method comes from one side.
+    if (!subtract(problem.heads, problem.share.line, problem.share.present, gap)) return solved;
+    linearise(law, gap.place, gap.rate);
+    int64_t rounds = 0;
+    bool pivoted = false;
+    for (int64_t number = 0; number < kMostTangents; ++number) {
+        solved = solve(problem);
+        if (solved.rounds <= 0 || !solved.finite) return solved;
+        rounds += solved.rounds;
+        pivoted = pivoted || solved.pivoted;
+        linearise(law, depth, rate);
+        const auto compensation = part(problem.room->solution, size(depth), solved.size);
+        if (agrees(gap, problem.share.rows, force, compensation, law, number)) {
+            solved.rounds = rounds;
+            solved.pivoted = pivoted;
+            return solved;
+        }
+    }
+    return {0, 0, true, false, false};
+}
+
+int64_t find_forces(double time, const SmallProblem& problem, const StepLaw& law,
+                    std::span<int64_t> switched, Counts& counts) {
+    const Flags& flags = problem.share.flags[0];
+    const auto solution = problem.room->solution;
+    const int64_t n = size(problem.gap.place);
+    if (flags.broken != 0.0 || flags.missing != 0.0) return kLeft;
+    const Solved solved = solve(problem, law.marched);
+    if (solved.rounds <= 0 || !solved.finite) return kLeft;
+    if (!solved.complete) return kTooSmall;
+    if (!report(time, solution.first(n), law.reported)) return kLeft;
+    if (law.marched) remember(*law.marched, problem.found.depth, problem.found.rate);
+    counts.rounds += solved.rounds;
+    counts.pivoted += solved.pivoted;
+    for (int64_t k = 0; k < solved.size - n; ++k) {
+        switched[k] = problem.share.rows.number(k);
+        counts.slack += solution[n + k] != 0.0 && problem.coupled.slackens[switched[k]];
+    }
+    return solved.size - n;
+}
+
+void widen(const Bounds& bounds) {
+    for (auto limits : {bounds.push, bounds.pull, bounds.loss})
+        for (double& limit : limits) limit *= 2.0;
 }
 
 }  // namespace catenary

@@ -1,11 +1,154 @@
-// Base of all pantographs stepped by Newmark's method.
+// Pantographs stepped by Newmark's method: a regulated lift, laws that are not linear, the base of
+// all, and steps without contact, of linear chains and of masses whose matrix is made anew.
 #include "heads/head.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <stdexcept>
 
 namespace catenary {
+
+namespace {
+
+/// Part of a step by which a sample may come early: times are sums.
+constexpr double kEarly = 1e-6;
+
+ControlGains gains_at(std::span<const ControlGains> gains, double measured) {
+    const int64_t n = size(gains);
+    int64_t i = 0;
+    while (i < n - 2 && gains[i + 1].measured <= measured) ++i;
+    const ControlGains &low = gains[i], &high = gains[std::min(i + 1, n - 1)];
+    double part = 0.0;
+    if (&high != &low)
+        part = std::clamp((measured - low.measured) / (high.measured - low.measured), 0.0, 1.0);
+    return {measured, low.of_error + part * (high.of_error - low.of_error),
+            low.of_integral + part * (high.of_integral - low.of_integral),
+            low.of_rate + part * (high.of_rate - low.of_rate)};
+}
+
+/// Take in the value measured at the end of a step; put the added force of the next one. The
+/// integral stands while the force is at a limit and the error would drive it beyond.
+void regulate(const Regulation& regulation, double measured) {
+    const RegulationSettings& settings = regulation.settings.front();
+    RegulationMemory& memory = regulation.memory.front();
+    memory.time += settings.dt;
+    if (memory.samples < 0.0) {
+        // The first step begins where it is: a filter has no start of its own.
+        memory.filtered = measured;
+        memory.samples = 0.0;
+    }
+    memory.filtered += settings.part * (measured - memory.filtered);
+    if (memory.time < memory.next - kEarly * settings.dt) return;
+    memory.next += settings.sample;
+    const double error = settings.target - memory.filtered;
+    const ControlGains gains = gains_at(regulation.gains, memory.filtered);
+    const double rate = memory.samples == 0.0 ? 0.0 : (error - memory.error) / settings.sample;
+    const double integral = memory.integral + settings.sample * error;
+    const double wanted =
+        gains.of_error * error + gains.of_integral * integral + gains.of_rate * rate;
+    const double allowed = std::min(std::max(wanted, settings.least), settings.most);
+    if ((settings.least <= wanted && wanted <= settings.most) ||
+        (wanted - allowed) * gains.of_integral * error <= 0.0)
+        memory.integral = integral;
+    memory.error = error;
+    if (regulation.waiting.empty()) {
+        memory.acting = allowed;
+    } else {
+        double& waiting =
+            regulation.waiting[static_cast<int64_t>(memory.samples) % size(regulation.waiting)];
+        memory.acting = waiting;
+        waiting = allowed;
+    }
+    memory.samples += 1.0;
+}
+
+/// Segments of tables mostly settle in two rounds; a cycle of segments is left after so many.
+constexpr int kMostRounds = 20;
+
+/// The part of a law's variable that is not the head's: of base, roof and where it counts from.
+double outside(const HeadLaw& law, const StepStart& start) {
+    return law.of_rate ? law.by_base * start.base_velocity + law.by_roof * start.roof_velocity
+                       : law.by_base * start.base + law.by_roof * start.roof - law.zero;
+}
+
+}  // namespace
+
+SettlingLaws::SettlingLaws(const HeadLaws& laws, int64_t n)
+    : laws_(laws),
+      plain_force_(n),
+      plain_matrix_(n * n),
+      acceleration_(n),
+      segment_(laws.law.size()) {
+    for (const HeadLaw& law : laws.law)
+        if (law.begin < 0 || law.end < law.begin + 2 || law.end > size(laws.points))
+            throw std::invalid_argument("a law has two points at least");
+}
+
+/// Find the segments in which laws are with the accelerations at hand; whether one has changed.
+bool SettlingLaws::find_segments(const StepStart& start, const NewmarkFactors& newmark) {
+    bool changed = false;
+    for (int64_t j = 0; j < size(laws_.law); ++j) {
+        const HeadLaw& law = laws_.law[j];
+        const auto way = laws_.ways[j];
+        double at = outside(law, start);
+        for (int64_t i = 0; i < size(way); ++i)
+            at += way[i] * (law.of_rate ? start.velocity[i] + newmark.velocity * acceleration_[i]
+                                        : start.position[i] + newmark.position * acceleration_[i]);
+        int64_t k = law.begin;
+        while (k < law.end - 2 && laws_.points[k + 1].at <= at) ++k;
+        changed = changed || k != segment_[j];
+        segment_[j] = k;
+    }
+    return changed;
+}
+
+/// Add a law along its segment.
+void SettlingLaws::add(int64_t number, const StepStart& start, const NewmarkFactors& newmark,
+                       std::span<double> force, Array2<double> matrix) const {
+    const HeadLaw& law = laws_.law[number];
+    const auto way = laws_.ways[number];
+    const int64_t n = size(way);
+    const HeadLawPoint &low = laws_.points[segment_[number]],
+                       &high = laws_.points[segment_[number] + 1];
+    const double slope = (high.force - low.force) / (high.at - low.at);
+    const double factor = law.of_rate ? newmark.velocity : newmark.position;
+    const auto predicted = law.of_rate ? start.velocity : start.position;
+    double at = outside(law, start);
+    for (int64_t i = 0; i < n; ++i) at += way[i] * predicted[i];
+    const double pull = low.force + slope * (at - low.at);
+    for (int64_t i = 0; i < n; ++i) {
+        if (way[i] == 0.0) continue;
+        force[i] -= way[i] * pull;
+        for (int64_t k = 0; k < n; ++k) matrix(i, k) += factor * slope * way[i] * way[k];
+    }
+}
+
+void SettlingLaws::settle(const StepStart& start, const NewmarkFactors& newmark,
+                          std::span<double> force, Array2<double> matrix) {
+    const int64_t n = size(force);
+    std::ranges::copy(force, plain_force_.begin());
+    std::ranges::copy(matrix.all(), plain_matrix_.begin());
+    std::ranges::copy(start.acceleration, acceleration_.begin());
+    std::ranges::fill(segment_, -1);
+    for (int round = 0; round < kMostRounds; ++round) {
+        if (!find_segments(start, newmark)) return;
+        std::ranges::copy(plain_force_, force.begin());
+        std::ranges::copy(plain_matrix_, matrix.all().begin());
+        for (int64_t j = 0; j < size(laws_.law); ++j) add(j, start, newmark, force, matrix);
+        invert(matrix);
+        for (int64_t i = 0; i < n; ++i) {
+            double value = 0.0;
+            for (int64_t k = 0; k < n; ++k) {
+                double push = force[k];
+                for (int64_t j = 0; j < size(laws_.pressed); ++j)
+                    push -= start.touch(j, k) * laws_.pressed[j];
+                value += matrix(i, k) * push;
+            }
+            acceleration_[i] = value;
+        }
+    }
+}
 
 Head::Head(const HeadArrays& arrays)
     : parts_{arrays, 0, {}, {}, {}, {}, {}},
@@ -210,6 +353,90 @@ bool Head::predict(std::span<const double> drive, std::span<double> numbers, int
         }
     }
     return within;
+}
+
+bool Head::step_free(const Drive& drive) {
+    if (!parts_.linear) return step_sprung(drive);
+    step_linear(drive);
+    return true;
+}
+
+void Head::remember(std::span<const double> contact_force) {
+    if (laws_) std::ranges::copy(contact_force, parts_.sprung->laws.pressed.begin());
+}
+
+void Head::step_linear(const Drive& drive) {
+    const auto& [matrix, by_drive, by_head, inverse] = *parts_.linear;
+    const std::span<const double> now = arrays().state;
+    const double lift = drive.force + added(drive);
+    for (int64_t i = 0; i < size(now); ++i) {
+        double value = lift * by_drive[i] + drive.head_air * by_head[i];
+        const auto row = matrix[i];
+        for (int64_t k = 0; k < size(now); ++k) value += row[k] * now[k];
+        free_[i] = value;
+    }
+    respond(inverse);
+}
+
+bool Head::step_sprung(const Drive& drive) {
+    const SprungMasses& sprung = *parts_.sprung;
+    const auto &stiffness = sprung.stiffness, &damping = sprung.damping;
+    const NewmarkFactors& s = newmark();
+    const auto q = state(0), v = state(1), a = state(2);
+    const Array2<double> matrix{matrix_.data(), n_, n_};
+    for (int64_t i = 0; i < n_; ++i) {
+        position_[i] = q[i] + s.dt * v[i] + s.predict_position * a[i];
+        velocity_[i] = v[i] + s.predict_velocity * a[i];
+    }
+    for (int64_t i = 0; i < n_; ++i) {
+        double value = 0.0;
+        for (int64_t k = 0; k < n_; ++k) {
+            value -= stiffness(i, k) * position_[k] + damping(i, k) * velocity_[k];
+            matrix(i, k) = s.velocity * damping(i, k) + s.position * stiffness(i, k);
+        }
+        force_[i] = value + drive.head_air * sprung.push[i];
+        matrix(i, i) += sprung.masses[i];
+    }
+    bool within = true;
+    if (sprung.mechanism)
+        within = raise(drive, *sprung.mechanism);
+    else
+        force_[sprung.carrier] += drive.force + added(drive);
+    if (laws_)
+        laws_->settle({position_, velocity_, a, arrays().touch[0], drive.base, drive.base_velocity,
+                       drive.roof, drive.roof_velocity},
+                      s, force_, matrix);
+    else
+        invert(matrix);
+    for (int64_t i = 0; i < n_; ++i) {
+        double acceleration = 0.0;
+        for (int64_t k = 0; k < n_; ++k) acceleration += matrix(i, k) * force_[k];
+        free_[i] = position_[i] + s.position * acceleration;
+        free_[n_ + i] = velocity_[i] + s.velocity * acceleration;
+        free_[2 * n_ + i] = acceleration;
+    }
+    respond(matrix);
+    return within;
+}
+
+bool Head::raise(const Drive& drive, const ReducedMechanism& mechanism) {
+    using enum ReducedMechanism::Column;
+    const SplineTables& tables = mechanism.tables;
+    const int64_t at = parts_.sprung->carrier, m = tables.coefficients.rows;
+    const NewmarkFactors& s = newmark();
+    height_ = position_[at] - mechanism.zero - drive.base;
+    const double speed = velocity_[at] - drive.base_velocity;
+    std::array<double, kMostColumns> value{}, slope{};
+    tables_at(tables, height_, std::span(value).first(m), std::span(slope).first(m));
+    force_[at] += drive.part * (value[kLift] - mechanism.weight) + added(drive) -
+                  value[kSlowing] * speed - 0.5 * slope[kMass] * speed * speed;
+    // The base carries the mechanism along, but less mass than the raised one if parts stay low.
+    force_[at] += (value[kMass] - value[kCarried]) * drive.base_acceleration;
+    force_[at] += drive.arm_air + drive.bodies_air * value[kBlown];
+    matrix_[at * (n_ + 1)] +=
+        value[kMass] + s.velocity * (value[kSlowing] + slope[kMass] * speed) -
+        s.position * (drive.part * slope[kLift] + drive.bodies_air * slope[kBlown]);
+    return !(height_ < tables.breaks.front() || height_ > tables.breaks.back());
 }
 
 }  // namespace catenary

@@ -1,12 +1,199 @@
 #pragma once
-// Pantographs stepped by Newmark's method: the row that drives a step, state, strips, contact; and
-// the lowering under way until the head is caught, see mbs/lowering.py.
+// Pantographs stepped by Newmark's method: the row that drives a step, state, strips, contact. With
+// a regulated lift, filter, samples, gains, limits, delay (mbs/control.py); laws that are not
+// linear, tables that settle within a step (mbs/head/laws.py); and the lowering under way until the
+// head is caught (mbs/lowering.py).
+//
+// A head has n coordinates and s strips; its state are positions, velocities and accelerations one
+// after the other (3 n,).
+#include <optional>
 #include <vector>
 
-#include "contact/touch.hpp"
-#include "heads/laws.hpp"
+#include "base/arrays.hpp"
+#include "base/curves.hpp"
+#include "contact/contacts.hpp"
 
 namespace catenary {
+
+struct RegulationSettings {
+    double of_height;    ///< 1 if the head's height is measured, 0 for the contact force
+    double target;       ///< wanted value [m] or [N]
+    double part;         ///< share of the deviation that the filter takes in a step [-]
+    double dt;           ///< step [s]
+    double sample;       ///< time between samples [s]
+    double least, most;  ///< added force [N]
+};
+
+/// ControlGains where a value is measured; straight in between, constant beyond the ends.
+struct ControlGains {
+    double measured;  ///< [m] or [N]
+    double of_error, of_integral, of_rate;
+};
+
+struct RegulationMemory {
+    double time;      ///< [s]
+    double next;      ///< when the next sample is [s]
+    double filtered;  ///< measured value after the filter [m] or [N]
+    double integral;  ///< of the error [.. s]
+    double error;     ///< at the latest sample
+    double samples;   ///< how many there were, -1 before the first step
+    double acting;    ///< added force [N]
+};
+
+struct Regulation {
+    std::span<const RegulationSettings> settings;  ///< (1,)
+    std::span<const ControlGains> gains;           ///< one row at least
+    std::span<RegulationMemory> memory;            ///< (1,)
+    std::span<double> waiting;                     ///< forces that wait, one a sample of delay [N]
+    CATENARY_RECORD(settings, gains, memory, waiting)
+    CATENARY_SHAPES("1, g>0, 1")
+};
+
+/// Factors of Newmark's formulas, the same for all coordinates.
+struct NewmarkFactors {
+    double dt;                                  ///< step [s]
+    double predict_position, predict_velocity;  ///< dt^2 (1/2 - beta) [s2], dt (1 - gamma) [s]
+    double position, velocity;                  ///< beta dt^2 [s2], gamma dt [s]
+    CATENARY_RECORD(dt, predict_position, predict_velocity, position, velocity)
+};
+
+/// Arrays of a head.
+struct HeadArrays {
+    Array3<double> touch;     ///< (2, s, n) by how much each coordinate raises each strip, and how
+                              ///< fast that changes
+    std::span<double> state;  ///< (3 n,) at the end of the latest step
+    std::span<double> out;    ///< (2 s + 2 s^2,) heights and velocities of the strips without
+                              ///< contact, and both matrices of compliance, row by row
+    NewmarkFactors newmark;
+    int64_t roll;  ///< coordinate of the head's roll, -1 without it
+    CATENARY_RECORD(touch, state, out, newmark, roll)
+    CATENARY_SHAPES("2 s n, 3n")
+};
+
+/// A step without contact of a chain of masses on linear springs and dampers, with forces F: new
+/// state = matrix @ state + F by_drive + F_head by_head.
+struct LinearStep {
+    Array2<const double> matrix;       ///< (3 n, 3 n)
+    std::span<const double> by_drive;  ///< (3 n,) of the force on the last mass
+    std::span<const double> by_head;   ///< (3 n,) of that on the head
+    Array2<const double> inverse;      ///< (n, n) of the matrix that gives accelerations
+    CATENARY_RECORD(matrix, by_drive, by_head, inverse)
+    CATENARY_SHAPES("3n 3n, 3n, 3n, n n")
+};
+
+/// A law's extension is way @ coordinates + by_base * base + by_roof * roof - zero; it pulls by a
+/// table over this, or over its rate.
+struct HeadLaw {
+    double by_base;      ///< part of the base's height
+    double by_roof;      ///< part of the roof's
+    double zero;         ///< where extensions count from [m]
+    int64_t of_rate;     ///< whether its points are rates
+    int64_t begin, end;  ///< its points, two at least
+};
+struct HeadLawPoint {
+    double at;     ///< [m] or [m/s]
+    double force;  ///< [N]
+};
+/// m laws on n coordinates.
+struct HeadLaws {
+    Array2<const double> ways;  ///< (m, n)
+    std::span<const HeadLaw> law;
+    std::span<const HeadLawPoint> points;  ///< of all laws
+    std::span<double> pressed;             ///< (s,) contact forces of the latest step [N]
+    CATENARY_RECORD(ways, law, points, pressed)
+    CATENARY_SHAPES("m n, m, *, s")
+};
+
+/// What raises a head, see mbs/mechanism/reduced_pantograph.py; its height is a coordinate.
+struct ReducedMechanism {
+    /// Columns of the tables; the last one may be missing.
+    enum Column { kMass, kLift, kSlowing, kCarried, kBlown, kMostColumns };
+    SplineTables tables;  ///< mass [kg], lift [N], damping [N s/m], carried mass [kg] and, of some,
+                          ///< lift by the air [N], over the mechanism's height [m]
+    double weight;        ///< of the head [N]
+    double zero;          ///< the coordinate where the mechanism's height is zero [m]
+    CATENARY_RECORD(tables, weight, zero)
+};
+
+/// Masses on linear springs and dampers, with laws, whose matrix is made anew in each step.
+struct SprungMasses {
+    std::span<const double> masses;           ///< (n,)
+    Array2<const double> stiffness, damping;  ///< (n, n)
+    std::span<const double> push;  ///< (n,) force on each coordinate by an upward unit force on the
+                                   ///< strips' middle
+    int64_t carrier;               ///< the coordinate that is driven
+    HeadLaws laws;
+    std::optional<ReducedMechanism> mechanism;  ///< that drives it, if it is no chain
+    CATENARY_RECORD(masses, stiffness, damping, push, carrier, laws, mechanism)
+    CATENARY_SHAPES("n, n n, n n, n, *, n=n s=s")
+};
+
+/// Strips that bend, see mbs/head/strips.py.
+struct Bending {
+    SplineTables tables;  ///< of m modes over the place on a strip [m]
+    int64_t first;        ///< coordinate of the first strip's first mode, the others behind it
+    int64_t wires;        ///< that may touch each strip
+    CATENARY_RECORD(tables, first, wires)
+};
+
+/// Memory of a lowering. Heights are of the strips' mean over the housing, which catches the head.
+struct LoweringMemory {
+    double height;     ///< now [m]
+    double caught_at;  ///< where it is caught [m], known from the lowering on
+    double phase;      ///< 0 before the lowering, 1 during it, 2 when the head is caught
+};
+
+struct Lowering {
+    double time;                       ///< after which it begins [s]
+    double drop;                       ///< of the head until it is caught [m]
+    std::span<LoweringMemory> memory;  ///< (1,)
+    CATENARY_RECORD(time, drop, memory)
+    CATENARY_SHAPES("*, *, 1")
+};
+
+/// All that a head is: its model is linear or sprung.
+struct HeadParts {
+    HeadArrays arrays;
+    int64_t first;  ///< number of its first contact among the train's contacts
+    std::optional<LinearStep> linear;
+    std::optional<SprungMasses> sprung;
+    std::optional<Bending> bending;
+    std::optional<Regulation> regulation;
+    std::optional<Lowering> lowering;
+    CATENARY_RECORD(arrays, first, linear, sprung, bending, regulation, lowering)
+    CATENARY_SHAPES("n=n s=s, *, n=n, n=n s=s")
+};
+
+/// Start of a step: Newmark's predictors and the other variables of laws.
+struct StepStart {
+    std::span<const double> position, velocity;  ///< predicted (n,)
+    std::span<const double> acceleration;        ///< of the state (n,)
+    Array2<const double> touch;                  ///< (s, n), see `HeadArrays`
+    double base, base_velocity;                  ///< [m], [m/s]
+    double roof, roof_velocity;                  ///< [m], [m/s]
+};
+
+/// The laws of a head, with room to settle in.
+class SettlingLaws {
+  public:
+    SettlingLaws(const HeadLaws& laws, int64_t n);
+    /// Add the laws to a step's `force` (n,) and `matrix` (n, n), and invert the latter in place.
+    ///
+    /// Each law is taken along the segment of its table in which the step ends under the contact
+    /// forces of the step before: first where the accelerations of the start lead to, then again
+    /// until all segments stay.
+    void settle(const StepStart& start, const NewmarkFactors& newmark, std::span<double> force,
+                Array2<double> matrix);
+
+  private:
+    bool find_segments(const StepStart& start, const NewmarkFactors& newmark);
+    void add(int64_t law, const StepStart& start, const NewmarkFactors& newmark,
+             std::span<double> force, Array2<double> matrix) const;
+
+    HeadLaws laws_;
+    std::vector<double> plain_force_, plain_matrix_, acceleration_;
+    std::vector<int64_t> segment_;
+};
 
 /// Inputs of a head's step besides its state: the first numbers of a row that is known before the
 /// step. Upward is positive; a model reads the ones that it needs.

@@ -1,6 +1,7 @@
 #pragma once
-// Loads in time on the unknowns that a rank solves for. See line_loads.py.
-#include "loads/memories.hpp"
+// Loads in time on the unknowns that a rank solves for, see line_loads.py; amplitudes of
+// gusts along a line, and the waves that they make, see gust_field.py.
+#include "loads/ends.hpp"
 
 namespace catenary {
 
@@ -54,5 +55,16 @@ struct Loads {
 
 /// Fill in `values` at the time of the clock.
 void evaluate(const Loads& loads);
+
+/// Fill `out` (m, k) with values at m points between two posts of k first-order Gauss-Markov
+/// processes, which are `first` and `last` at the posts and decay as exp(-rate d), rates in 1/m.
+/// `steps` (m + 1,) are from the first post to the point after it, and so on to the last post [m];
+/// `normals` (m, k) standard normal numbers.
+void bridge(std::span<const double> first, std::span<const double> last,
+            std::span<const double> rates, std::span<const double> steps,
+            Array2<const double> normals, Array2<double> out);
+
+/// Add waves (s, k) times amplitudes (k, m) to `out` (s, m), in one order for any s and m.
+void add_waves(Array2<const double> waves, Array2<const double> amplitudes, Array2<double> out);
 
 }  // namespace catenary

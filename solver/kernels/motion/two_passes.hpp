@@ -3,7 +3,7 @@
 // and a window that follows the train. See stations/line.hpp for the passes.
 #include <optional>
 
-#include "motion/links.hpp"
+#include "motion/motion.hpp"
 #include "motion/window.hpp"
 #include "stations/records.hpp"
 

@@ -1,7 +1,7 @@
 #pragma once
 // A window of moving stations that follows the train. Stations outside of it are at rest: no step
 // reads or writes them, but for the ones beside it, which are held where they are.
-#include "motion/state.hpp"
+#include "motion/motion.hpp"
 #include "stations/elimination.hpp"
 #include "stations/line.hpp"
 

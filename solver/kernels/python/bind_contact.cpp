@@ -1,9 +1,8 @@
 // Python bindings of contacts, and of the small problem of a step.
 #include "contact/contacts.hpp"
-#include "contact/outputs.hpp"
 #include "contact/response.hpp"
-#include "contact_problem/forces.hpp"
-#include "contact_problem/simplicial_path.hpp"
+#include "contact_problem/small_problem.hpp"
+#include "contact_problem/pivoting.hpp"
 #include "python/from_python.hpp"
 
 namespace catenary::python {

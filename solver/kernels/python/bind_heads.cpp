@@ -1,6 +1,6 @@
 // Python bindings of pantographs: heads, and multibody systems.
 #include "heads/head.hpp"
-#include "multibody/joints_and_lines.hpp"
+#include "multibody/bodies.hpp"
 #include "python/from_python.hpp"
 
 namespace catenary::python {

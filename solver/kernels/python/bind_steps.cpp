@@ -1,6 +1,8 @@
-// Python bindings of steps and their rows, and of lines prepared for steps from outside.
+// Python bindings of steps and their rows, of marches side by side, and of lines prepared for steps
+// from outside.
 #include <algorithm>
 
+#include "ensemble/ensemble.hpp"
 #include "python/from_python.hpp"
 #include "simulation/simulation.hpp"
 #include "tangents/tangents.hpp"
@@ -34,6 +36,17 @@ void take_points(Array2<const double> rows, std::span<const int64_t> columns,
                                [row](int64_t column) { return column >= 0 ? row[column] : 0.0; });
         at += count[i];
     }
+}
+
+/// Numbers of scenes, ascending, that kernels step side by side on a line of these layouts.
+std::vector<int> scenes_at_once(const std::vector<std::pair<Layout, Layout>>& layouts) {
+    std::vector<int> found;
+    for (const int scenes : {kScenes, kMostScenes})
+        if (std::ranges::all_of(layouts, [scenes](const auto& of) {
+                return kernels_for_scenes(of.first, of.second, scenes) != nullptr;
+            }))
+            found.push_back(scenes);
+    return found;
 }
 
 /// A simulation, with arrays that are views of its numbers.
@@ -108,6 +121,20 @@ void offer_steps(py::module_& module) {
     py::class_<TangentSteps>(module, "TangentSteps")
         .def(made_of<TangentSteps, StepParts, Block, MarchTangents>("parts", "block", "tangents"))
         .def("take", &TangentSteps::take);
+    offer_records<LineExtremes>(module);
+    module.def("scenes_at_once", &scenes_at_once, py::arg("layouts"));
+    py::class_<ScenePasses, std::shared_ptr<ScenePasses>>(module, "ScenePasses")
+        .def(made_of<ScenePasses, PassParts>("parts"))
+        .def("track", taking(&ScenePasses::track, "links", "rest", "reserves"))
+        .def("rest", &ScenePasses::rest)
+        .def("step", &ScenePasses::step);
+    py::class_<Ensemble>(module, "Ensemble")
+        .def(made_of<Ensemble, std::shared_ptr<ScenePasses>, LineExtremes>("passes", "extremes"))
+        .def("begin", &Ensemble::begin, py::arg("lane"), py::arg("steps").none(false), py::arg("n"))
+        .def("take", &Ensemble::take)
+        .def("at", [](const Ensemble& own, int64_t lane) {
+            return std::pair(own.at(lane).next, own.at(lane).is_left);
+        });
     CATENARY_OFFER_TYPE(module, "TIE", Tie, stiffness, damping);
     PYBIND11_NUMPY_DTYPE(Input, lift_force, head_force, base, base_velocity, base_acceleration);
     py::class_<HeldSimulation>(module, "Simulation")

@@ -3,12 +3,8 @@
 #include "base/curves.hpp"
 #include "base/flush_to_zero.hpp"
 #include "base/targets.hpp"
-#include "line/condensing.hpp"
-#include "line/gusts.hpp"
-#include "loads/fourier.hpp"
 #include "loads/loads.hpp"
-#include "motion/links.hpp"
-#include "motion/shown.hpp"
+#include "motion/motion.hpp"
 #include "motion/window.hpp"
 #include "python/from_python.hpp"
 
@@ -18,7 +14,6 @@ void offer_stations(py::module_& module);
 void offer_contact(py::module_& module);
 void offer_steps(py::module_& module);
 void offer_heads(py::module_& module);
-void offer_ensemble(py::module_& module);
 
 namespace {
 
@@ -78,7 +73,6 @@ PYBIND11_MODULE(native, module) {
     offer_contact(module);
     offer_steps(module);
     offer_heads(module);
-    offer_ensemble(module);
 }
 
 }  // namespace catenary::python

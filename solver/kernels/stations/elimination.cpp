@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "base/inverse.hpp"
 #include "base/targets.hpp"
 
 // Factors are the same if they are so bit for bit. How many there are is not to depend on whether a

@@ -19,7 +19,7 @@
 #include <bit>
 #include <cstdint>
 
-#include "base/side_by_side.hpp"
+#include "base/targets.hpp"
 
 namespace catenary {
 

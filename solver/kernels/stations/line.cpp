@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "base/side_by_side.hpp"
+#include "base/targets.hpp"
 
 namespace catenary {
 

@@ -3,8 +3,6 @@
 
 #include <stdexcept>
 
-#include "base/checks.hpp"
-
 namespace catenary {
 
 Steps::Steps(StepParts parts, Block block)

@@ -3,12 +3,12 @@
 // problem of contact forces and switching links, and the motion of line and pantographs by both.
 #include <optional>
 
-#include "contact/outputs.hpp"
+#include "contact/contacts.hpp"
 #include "contact/response.hpp"
-#include "contact_problem/forces.hpp"
+#include "contact_problem/small_problem.hpp"
 #include "heads/head.hpp"
 #include "loads/loads.hpp"
-#include "motion/shown.hpp"
+#include "motion/motion.hpp"
 #include "motion/two_passes.hpp"
 
 namespace catenary {

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "base/targets.hpp"
-#include "contact/columns.hpp"
 
 namespace catenary {
 

@@ -20,7 +20,9 @@ def test_the_module_refuses_compilers_that_are_too_old() -> None:
 
 
 PROGRAM = """
-#include "base/checks.hpp"
+#include <cmath>
+
+#include "base/arrays.hpp"
 int main(int n, char**) {
     double numbers[] = {1.0, INFINITY};
     if (n == 1) catenary::check_numbers(numbers, "a motion");

@@ -1,9 +1,35 @@
 #pragma once
-// Sums over the past of a line's ends. See end_memory.py.
+// Ends of a line: dynamic condensation of the spans beyond them, Schur complements at frequencies
+// (half_lines.py), and sums over their past (end_memory.py), by Fourier transforms in place whose
+// length is a power of two.
+#include <complex>
+#include <span>
+
 #include "base/arrays.hpp"
-#include "base/complex.hpp"
 
 namespace catenary {
+
+using Complex = std::complex<double>;
+
+inline Complex product(Complex one, Complex other) {
+    return {one.real() * other.real() - one.imag() * other.imag(),
+            one.real() * other.imag() + one.imag() * other.real()};
+}
+inline Complex product(Complex one, double other) {
+    return {one.real() * other, one.imag() * other};
+}
+
+/// Fill `taken` (n, k, k) with beside^T inverse(bands) beside, with `weights` (n, 3) of M, C and K
+/// in each; see `SpanMatrices`. L D L^T without pivots: with waves that fade, all leading blocks
+/// are those of damped lines.
+void condense_spans(Array2<const Complex> weights, Array3<const double> bands,
+                    Array3<const double> beside, Array3<Complex> taken);
+
+/// Transform numbers in place, into the order of reversed bits. `turns` hold exp(-i pi k / h)
+/// at h + k for each power h below the length.
+void fourier_forth(std::span<Complex> numbers, std::span<const Complex> turns);
+/// Transform the result of `fourier_forth` back into the numbers, times their count.
+void fourier_back(std::span<Complex> numbers, std::span<const Complex> turns);
 
 /// Lags below this are summed one by one; a power of two.
 constexpr int64_t kNear = 128;
