@@ -57,8 +57,8 @@ def wire_parts(model: Model, at: np.ndarray, exact: bool) -> list[Part]:
         dofs = np.stack([at[first], at[first] + 1, at[second], at[second] + 1], axis=1)
         tension = wire.tension_at(0.5 * (mesh.x(first) + mesh.x(second)))
         chosen, kind = alike(np.column_stack([length, tension]))
-        elements = exact_beam if exact else beam
-        stiffness = elements.stiffness(length[chosen], wire.bending_stiffness, tension[chosen])
+        matrices = exact_beam.stiffness if exact else beam.stiffness
+        stiffness = matrices(length[chosen], wire.bending_stiffness, tension[chosen])
         parts.append(Part(dofs, stiffness, kind))
     return parts
 
