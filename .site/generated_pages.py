@@ -11,8 +11,7 @@ from mkdocs.structure.files import File, Files
 
 from catenary.cases.cli.main import app
 from catenary.cases.terminal.lists import Key, allowed, comparison, keys_of_a_scene, scene_schema
-from catenary.postproc.standards.library import shipped
-from catenary.postproc.standards.quantities import LIMIT_KEYS, QUANTITIES
+from catenary.postproc.standards.rule_books import LIMIT_KEYS, QUANTITIES, shipped
 
 _KEYS = """# Keys of a scene
 

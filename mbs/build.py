@@ -12,8 +12,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.mbs.air import Airflow, AirForces, SteadyForces
-from catenary.mbs.control import Regulator
-from catenary.mbs.head.laws import given_way
+from catenary.mbs.head.laws import Regulator, given_way
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import Pantograph

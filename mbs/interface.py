@@ -1,13 +1,17 @@
-"""Interface of pantographs to the coupling, for lumped masses and multibody systems.
+"""Interface of pantographs to the coupling and the kernels: lumped masses, multibody systems.
 
 Heights are measured like the line's, z up [m]; contact forces are >= 0 in compression and push
 the head down. A head touches the wire with s strips, mostly one; where several contact wires run
 side by side each of them may touch each strip, and what is said of strips holds for contacts, those
 of one strip together. A pantograph lives on rank 0 and is never called elsewhere.
+
+Kernels take rows that drive heads, and tables of these (`solver/kernels/heads`). A pantograph that
+no kernel takes has its steps asked of Python by the loop of kernels.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -76,3 +80,49 @@ class Pantograph(Protocol):
     def base(self, time: float) -> float:
         """Height at ``time`` [s] of the base that a mechanism's points count from [m]; how far a
         vehicle has lifted it for lumped masses."""
+
+
+N_DRIVE = native.DRIVE.itemsize // 8
+
+
+def drive_width(n_strips: int) -> int:
+    """Numbers of a step's row for a head with so many strips."""
+    return N_DRIVE + 2 * n_strips
+
+
+def named(rows: np.ndarray) -> np.ndarray:
+    """The numbers that have names of ``rows`` (..., width), a view of shape (...)."""
+    return rows[..., :N_DRIVE].view(native.DRIVE)[..., 0]
+
+
+def spline_tables(breaks: np.ndarray, coefficients: np.ndarray) -> native.SplineTables:
+    """Tables of m cubic splines by scipy's ``coefficients`` (4, n - 1, m) over ``breaks`` (n,)."""
+    return native.SplineTables(breaks, np.ascontiguousarray(coefficients.transpose(1, 2, 0)))
+
+
+def tables_at(tables: native.SplineTables, x: float) -> tuple[np.ndarray, np.ndarray]:
+    """Values and slopes (m,) of all splines; their ends go on beyond the breaks."""
+    values, slopes = np.empty((2, tables.coefficients.shape[1]))
+    native.tables_at(tables, x, values, slopes)
+    return values, slopes
+
+
+def called_by_kernels(
+    model: Pantograph, after: Callable[[], None] = lambda: None
+) -> tuple[native.Head, HeadState, np.ndarray]:
+    """Any pantograph in a loop of kernels, which calls ``after`` after each step: its head, the
+    latest prediction, and ``Pantograph.places`` at the end of the latest step, in one array."""
+    head, places = HeadState(len(model.strip_offsets)), np.array(model.places())
+
+    def predict(time: float) -> None:
+        head.numbers[:] = model.predict(time).numbers
+
+    def advance(contact_force: np.ndarray) -> None:
+        model.advance(contact_force)
+        places[:] = model.places()
+        after()
+
+    still = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
+    strips = np.zeros((2, len(model.strip_offsets), 0))
+    arrays = native.HeadArrays(strips, np.zeros(0), head.numbers, still, -1)
+    return native.CalledHead(arrays, predict, advance), head, places

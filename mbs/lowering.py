@@ -12,12 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.mbs.called_model import called_by_kernels
-from catenary.mbs.head.head_arrays import drive_width, named
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.stepping import Part, Raising
-from catenary.mbs.interface import HeadState, Pantograph
-from catenary.mbs.vehicle.base_motion import BaseMotion, lifted
+from catenary.mbs.interface import HeadState, Pantograph, called_by_kernels, drive_width, named
+from catenary.mbs.vehicle import BaseMotion, lifted
 from catenary.solver.kernels import native
 
 

@@ -12,7 +12,7 @@ from catenary.mbs.air import AirForces
 from catenary.mbs.head.newmark_head import SteppedHead, head_of
 from catenary.mbs.head.stepping import Raising, Stepping
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
-from catenary.mbs.vehicle.base_motion import lifted
+from catenary.mbs.vehicle import lifted
 from catenary.solver.kernels import native
 
 # Half of the time over which the speed of a base that is lowered, too, is found [s]: a half cosine

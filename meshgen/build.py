@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.meshgen.chains import assemble, names_of
 from catenary.meshgen.geometry import divide, divisions_of, find_cuts
 from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.mesh import LineMesh, assemble, names_of
 
 # A user's mesh may differ from the scene by this much along the track [m].
 _FIT = 0.01

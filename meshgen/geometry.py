@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.meshgen.chains import Groups
-from catenary.meshgen.hardware import Droppers
-from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import ANCHORS
+from catenary.meshgen.line import Droppers, Line
+from catenary.meshgen.mesh import ANCHORS, Groups
 from catenary.meshgen.wires import End
 
 # Places closer than this along the track are one cut [m].

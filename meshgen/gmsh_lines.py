@@ -10,11 +10,10 @@ import gmsh
 import numpy as np
 
 from catenary.base.errors import CatenaryError, InputError, RunBroken
-from catenary.base.python_signals import python_signals_kept
-from catenary.base.whole_files import appears_whole
+from catenary.base.files import appears_whole
+from catenary.base.process import python_signals_kept
 from catenary.meshgen.geometry import Cuts, divisions_of, find_cuts
-from catenary.meshgen.hardware import Droppers
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import Droppers, Line
 from catenary.meshgen.mesh import ANCHORS
 
 # The last line of a mesh file.

@@ -1,10 +1,19 @@
-"""The mesh of a line as arrays: nodes, wires as chains of nodes, and what hangs between them."""
+"""The mesh of a line as arrays: nodes, wires as chains of nodes, and what hangs between them.
+
+It is assembled from the groups of a mesh file: wires are put in order, droppers found, and all of
+it is checked.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.meshgen.line import Line
+from catenary.meshgen.wires import End
 
 # Names of the physical groups of a simple catenary's mesh file: lines, then points.
 CONTACT_WIRE = "contact_wire"
@@ -160,3 +169,352 @@ def elements_of(nodes: np.ndarray, breaks: np.ndarray = _NONE) -> np.ndarray:
     """
     pairs = np.stack([nodes[:-1], nodes[1:]], axis=1)
     return np.delete(pairs, breaks - 1, axis=0) if breaks.size else pairs
+
+
+# Nodes closer than this are taken for one place [m].
+_SAME_PLACE = 1e-6
+
+# A dropper is modelled as vertical; more lean along the track than this is a wrong mesh [m].
+_LEAN_LIMIT = 0.5
+
+
+@dataclass(frozen=True)
+class Joins:
+    """A group of droppers: its name and the wires that it joins."""
+
+    name: str
+    upper: str
+    lower: str
+
+
+@dataclass(frozen=True)
+class Names:
+    """The physical groups of a line's mesh file, beside ``anchors``.
+
+    Attributes
+    ----------
+    wires : name -> how each of its ends is held, piece by piece, from the contact wires upwards
+    droppers : groups of droppers
+    steady_arms, supports : name -> name of the wire at which they are
+    clamps : names of upper and lower wire, and places along the track [m]; they have no group in
+        the file
+    """
+
+    wires: dict[str, tuple[bool, ...]]
+    droppers: tuple[Joins, ...]
+    steady_arms: dict[str, str]
+    supports: dict[str, str]
+    clamps: tuple[tuple[str, str, tuple[float, ...]], ...] = ()
+
+
+SIMPLE = Names(
+    {CONTACT_WIRE: (True, True), MESSENGER_WIRE: (True, True)},
+    (Joins(DROPPERS, MESSENGER_WIRE, CONTACT_WIRE),),
+    {STEADY_ARMS: CONTACT_WIRE},
+    {SUPPORTS: MESSENGER_WIRE},
+)
+
+
+def names_of(line: Line) -> Names:
+    """The groups of a line's mesh file."""
+    return Names(
+        {
+            wire.name: tuple(end is End.HELD for piece in wire.pieces for end in piece.ends)
+            for wire in line.wires
+        },
+        tuple(Joins(group.name, group.upper, group.lower) for group in line.droppers),
+        {group.name: group.wire for group in line.steady_arms},
+        {group.name: group.wire for group in line.supports},
+        tuple((group.upper, group.lower, group.x) for group in line.clamps),
+    )
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Contents of a mesh file.
+
+    Attributes
+    ----------
+    points : (n, 3) [m]
+    lines : name -> (n, 2) int, elements of wires and droppers
+    nodes : name -> (n,) int, of steady arms, supports and anchors
+    """
+
+    points: np.ndarray
+    lines: dict[str, np.ndarray]
+    nodes: dict[str, np.ndarray]
+
+
+def assemble(groups: Groups, names: Names, source: str) -> LineMesh:
+    """The line mesh that the groups make. Not collective.
+
+    Parameters
+    ----------
+    groups : Groups
+        Physical groups that the file holds.
+    names : Names
+        Names of the groups.
+    source : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        If the groups do not make a line; the sentence names the group and the place.
+    """
+    points, starts, wires = groups.points, {}, {}
+    for name, held in names.wires.items():
+        wires[name], starts[name] = _order_wire(
+            points, groups.lines[name], len(held) // 2, f"{source}: {name}"
+        )
+    _check_apart(points, wires, source)
+    droppers = [
+        _find_droppers(points, wires, groups.lines[joins.name], joins, f"{source}: {joins.name}")
+        for joins in names.droppers
+    ]
+    for what, hardware in (("steady arm", names.steady_arms), ("support", names.supports)):
+        for name, wire in hardware.items():
+            stray = np.setdiff1d(groups.nodes[name], wires[wire])
+            if stray.size:
+                raise InputError(
+                    f"{source}: the {what} at {_at(points, stray[0])} is not a node of {wire}"
+                )
+    ends = [
+        _ends_of_pieces(wires[name], starts[name])[list(held)] for name, held in names.wires.items()
+    ]
+    _check_anchors(points, np.concatenate(ends), groups.nodes[ANCHORS], source)
+    return _renumber(groups, names, wires, starts, droppers)
+
+
+def _ends_of_pieces(nodes: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """First and last node of each piece of a wire, one after the other."""
+    lasts = np.append(starts[1:], nodes.size) - 1
+    return nodes[np.column_stack([starts, lasts]).ravel()]
+
+
+def _check_apart(points: np.ndarray, wires: dict[str, np.ndarray], source: str) -> None:
+    for (one, nodes), (other, others) in combinations(wires.items(), 2):
+        shared = np.intersect1d(nodes, others)
+        if shared.size:
+            raise InputError(
+                f"{source}: {one} and {other} share the node at {_at(points, shared[0])}"
+            )
+
+
+def _at(points: np.ndarray, node: int) -> str:
+    x, y, z = points[node]
+    return f"x = {x:g}, y = {y:g}, z = {z:g} m"
+
+
+def _order_wire(
+    points: np.ndarray, edges: np.ndarray, n_pieces: int, what: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of a wire in order of x, and the places in it of its pieces' first nodes.
+
+    An error unless its elements join just the neighbours in as many pieces.
+    """
+    _check_lengths(points, edges, what)
+    used, degree = np.unique(edges, return_counts=True)
+    nodes = used[np.argsort(points[used, 0], kind="stable")]
+    rank = np.full(points.shape[0], -1)
+    rank[nodes] = np.arange(nodes.size)
+    joined = np.sort(rank[edges], axis=1)
+    joined = joined[np.argsort(joined[:, 0], kind="stable")]
+    starts = np.setdiff1d(np.arange(nodes.size), joined[:, 1])
+    neighbours = np.delete(np.arange(nodes.size - 1), starts[1:] - 1)
+    if starts.size != n_pieces or not np.array_equal(
+        joined, np.column_stack([neighbours, neighbours + 1])
+    ):
+        raise InputError(_why_no_chain(points, used, degree, n_pieces, what))
+    level = np.flatnonzero(np.diff(points[nodes, 0]) < _SAME_PLACE)
+    if level.size:
+        raise InputError(
+            f"{what} does not advance along the track at {_at(points, nodes[level[0]])}"
+        )
+    return nodes, starts
+
+
+def _why_no_chain(
+    points: np.ndarray, used: np.ndarray, degree: np.ndarray, n_pieces: int, what: str
+) -> str:
+    ends, branches = used[degree == 1], used[degree > 2]
+    chain = "one simple chain" if n_pieces == 1 else f"{n_pieces} simple chains"
+    if branches.size:
+        return (
+            f"{what} is not {chain}: more than two of its elements meet at "
+            f"{_at(points, branches[0])}"
+        )
+    if ends.size != 2 * n_pieces and ends.size > 2:
+        places = ", ".join(f"{x:g}" for x in np.sort(points[ends, 0])[:6])
+        return (
+            f"{what} is not {chain} but {ends.size // 2} separate ones, which end at x = "
+            f"{places} m (nodes at the same place must be merged)"
+        )
+    return f"{what} is not {chain} in the order of x: it turns back or closes in itself"
+
+
+def _check_lengths(points: np.ndarray, edges: np.ndarray, what: str) -> None:
+    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    short = np.flatnonzero(length < _SAME_PLACE)
+    if short.size:
+        place = _at(points, edges[short[0], 0])
+        raise InputError(f"{what} has an element of zero length at {place}")
+
+
+def _find_droppers(
+    points: np.ndarray, wires: dict[str, np.ndarray], edges: np.ndarray, joins: Joins, what: str
+) -> np.ndarray:
+    """Upper and lower node of each dropper in order of x, (n, 2); chains are shortened to ends."""
+    _check_lengths(points, edges, what)
+    wire_of = np.full(points.shape[0], -1)
+    for number, name in enumerate(wires):
+        wire_of[wires[name]] = 2 + number
+    wire_of[wires[joins.upper]], wire_of[wires[joins.lower]] = 0, 1
+    ends = _ends_of_chains(points, wire_of >= 0, edges, joins, what)
+    sides = wire_of[ends]
+    wrong = np.flatnonzero((np.sort(sides, axis=1) != [0, 1]).any(axis=1))
+    if wrong.size:
+        first, last = ends[wrong[0]]
+        found = [next(n for n in wires if node in wires[n]) for node in (first, last)]
+        other = "itself" if found[0] == found[1] else found[1]
+        raise InputError(
+            f"{what}: the dropper from {_at(points, first)} to {_at(points, last)} joins "
+            f"{found[0]} with {other}, but must join {joins.upper} and {joins.lower}"
+        )
+    ends = np.take_along_axis(ends, np.argsort(sides, axis=1), axis=1)
+    ends = ends[np.lexsort((ends[:, 0], points[ends[:, 1], 0]))]
+    _check_droppers(points, ends, joins, what)
+    return ends
+
+
+def _ends_of_chains(
+    points: np.ndarray, on_wire: np.ndarray, edges: np.ndarray, joins: Joins, what: str
+) -> np.ndarray:
+    """Follow chains of elements from wire node to wire node, (n, 2)."""
+    if on_wire[edges].all():
+        return np.array(edges, dtype=np.int64)
+    meeting: dict[int, list[int]] = {}
+    for element, pair in enumerate(edges.tolist()):
+        for node in pair:
+            if not on_wire[node]:
+                meeting.setdefault(node, []).append(element)
+    for node, elements in meeting.items():
+        if len(elements) != 2:
+            fault = "ends in the air" if len(elements) == 1 else "branches"
+            raise InputError(
+                f"{what}: a dropper {fault} at {_at(points, node)}, but must join {joins.upper} "
+                f"and {joins.lower}"
+            )
+    found = []
+    visited = np.zeros(edges.shape[0], dtype=bool)
+    for start in range(edges.shape[0]):
+        first, node = edges[start].tolist()
+        if not on_wire[first]:
+            first, node = node, first
+        if visited[start] or not on_wire[first]:
+            continue
+        element = start
+        visited[element] = True
+        while not on_wire[node]:
+            element = sum(meeting[node]) - element  # the other one of the two
+            visited[element] = True
+            node = int(edges[element].sum()) - node
+        found.append((first, node))
+    if not visited.all():
+        loose = edges[np.flatnonzero(~visited)[0], 0]
+        raise InputError(f"{what}: the elements at {_at(points, loose)} join no wire")
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
+def _check_droppers(points: np.ndarray, ends: np.ndarray, joins: Joins, what: str) -> None:
+    """Refuse droppers that stand upside down, lean too far or lie on one another."""
+    across = points[ends[:, 0]] - points[ends[:, 1]]
+    inverted = np.flatnonzero(across[:, 2] < _SAME_PLACE)
+    if inverted.size:
+        raise InputError(
+            f"{what}: the dropper at {_at(points, ends[inverted[0], 1])} does not hang down: its "
+            f"end on {joins.upper} must be above its end on {joins.lower}"
+        )
+    leaning = np.flatnonzero(np.abs(across[:, 0]) > _LEAN_LIMIT)
+    if leaning.size:
+        raise InputError(
+            f"{what}: the dropper at {_at(points, ends[leaning[0], 1])} leans "
+            f"{abs(across[leaning[0], 0]):.3g} m along the track, but at most {_LEAN_LIMIT:g} m is "
+            "allowed"
+        )
+    # Both nodes as one number.
+    distinct, count = np.unique(ends @ [len(points), 1], return_counts=True)
+    if (count > 1).any():
+        place = _at(points, int(distinct[np.argmax(count)]) % len(points))
+        raise InputError(f"{what}: two droppers join the same nodes at {place}")
+
+
+def _check_anchors(points: np.ndarray, ends: np.ndarray, anchors: np.ndarray, source: str) -> None:
+    stray, free = np.setdiff1d(anchors, ends), np.setdiff1d(ends, anchors)
+    if stray.size:
+        raise InputError(
+            f"{source}: the anchor at {_at(points, stray[0])} is not the end of a wire"
+        )
+    if free.size:
+        raise InputError(
+            f"{source}: the end of a wire at {_at(points, free[0])} is in no group, but must be "
+            "in anchors"
+        )
+
+
+def _renumber(
+    groups: Groups,
+    names: Names,
+    wires: dict[str, np.ndarray],
+    starts: dict[str, np.ndarray],
+    droppers: list[np.ndarray],
+) -> LineMesh:
+    """The mesh with the wires' nodes only, numbered along the track, the upper wires' first.
+
+    Neighbours along the track get neighbouring numbers, across all wires, so that matrices have a
+    narrow band and their parts few neighbours.
+    """
+    points = groups.points
+    used = np.concatenate([wires[name] for name in reversed(names.wires)])
+    # x is rounded so that nodes of one station stay together whatever their last bits say.
+    order = used[np.argsort(np.round(points[used, 0], 6), kind="stable")]
+    number = np.full(points.shape[0], -1)
+    number[order] = np.arange(order.size)
+
+    def along(
+        members: list[np.ndarray], shape: tuple[int, ...] = (0,)
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Members of groups in order of x, and the number of each one's group."""
+        nodes = np.concatenate([np.zeros(shape, dtype=np.int64), *members])
+        group = np.repeat(np.arange(len(members)), [len(own) for own in members])
+        place = nodes if nodes.ndim == 1 else nodes[:, -1]
+        by_x = np.argsort(points[place, 0], kind="stable")
+        return number[nodes[by_x]], group[by_x]
+
+    hanging, dropper_group = along(droppers, (0, 2))
+    arms, arm_group = along([groups.nodes[name] for name in names.steady_arms])
+    supports, support_group = along([groups.nodes[name] for name in names.supports])
+    clamps = [
+        np.column_stack([_nearest(points, wires[name], x) for name in (upper, lower)])
+        for upper, lower, x in names.clamps
+    ]
+    return LineMesh(
+        points=points[order],
+        wires={name: number[nodes] for name, nodes in wires.items()},
+        droppers=hanging,
+        steady_arms=arms,
+        supports=supports,
+        anchors=along([groups.nodes[ANCHORS]])[0],
+        dropper_group=dropper_group,
+        arm_group=arm_group,
+        support_group=support_group,
+        breaks={name: at[1:] for name, at in starts.items() if at.size > 1},
+        clamps=number[np.concatenate([np.zeros((0, 2), dtype=np.int64), *clamps])],
+    )
+
+
+def _nearest(points: np.ndarray, nodes: np.ndarray, x: tuple[float, ...]) -> np.ndarray:
+    """Nodes of a wire that are nearest to places ``x`` [m]; ``nodes`` are all, in order of x."""
+    places = points[nodes, 0]
+    between = 0.5 * (places[1:] + places[:-1])
+    return np.asarray(nodes[np.searchsorted(between, np.array(x))])

@@ -12,9 +12,8 @@ import meshio
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.base.paths import is_file
-from catenary.meshgen.chains import SIMPLE, Groups, Names, assemble
-from catenary.meshgen.mesh import ANCHORS, LineMesh
+from catenary.base.files import is_file
+from catenary.meshgen.mesh import ANCHORS, SIMPLE, Groups, LineMesh, Names, assemble
 
 # A mesh of four million nodes takes half of it.
 MOST_BYTES = 500_000_000

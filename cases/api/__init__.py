@@ -18,18 +18,15 @@ if __name__ != "catenary":
 
 if TYPE_CHECKING:
     from catenary.base.errors import CatenaryError, Fault, InputError, RunBroken
-    from catenary.estimates import Uncertainty, uncertainty
-    from catenary.identifications import Identified, identify
     from catenary.line_tables import AtRest, Checked, Plan, check, plan, static
     from catenary.optimising import Optimum, optimise, tolerance
-    from catenary.pictures import Pictures
+    from catenary.parameters import Identified, identify, sensitivity
     from catenary.questions import highest_speeds, separations
-    from catenary.results import Run, open
+    from catenary.results import Pictures, Run, open
     from catenary.runs import restart, run
     from catenary.scenes import Scene, load, shipped_cases
-    from catenary.sensitivities import sensitivity
     from catenary.steps import Simulation, prepare
-    from catenary.sweeps import sweep
+    from catenary.sweeps import Uncertainty, sweep, uncertainty
 
 __all__ = [
     "AtRest",
@@ -67,19 +64,16 @@ __all__ = [
 ]
 
 _FILES = {
-    "estimates": ("Uncertainty", "uncertainty"),
-    "identifications": ("Identified", "identify"),
+    "sweeps": ("Uncertainty", "sweep", "uncertainty"),
+    "parameters": ("Identified", "identify", "sensitivity"),
     "line_tables": ("AtRest", "Checked", "Plan", "check", "plan", "static"),
     "optimising": ("Optimum", "optimise", "tolerance"),
-    "pictures": ("Pictures",),
+    "results": ("Pictures", "Run", "open"),
     "questions": ("highest_speeds", "separations"),
-    "results": ("Run", "open"),
     "runs": ("restart", "run"),
     "scenes": ("Scene", "load", "shipped_cases"),
-    "sensitivities": ("sensitivity",),
     "base.errors": ("CatenaryError", "Fault", "InputError", "RunBroken"),
     "steps": ("Simulation", "prepare"),
-    "sweeps": ("sweep",),
 }
 _FILE_OF = {name: file for file, names in _FILES.items() for name in names}
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.base.lone_process import alone, world
 from catenary.base.parallel import launched_by_mpirun, on_root
+from catenary.base.process import alone, world
 from catenary.cases.scene.input.faults import shown
 
 _PROGRESS = "catenary.progress"

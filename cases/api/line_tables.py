@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from catenary.cases.run.planning import plan as planning
+    from catenary.cases.run import plan as planning
     from catenary.cases.scene.scene import Scene as CheckedScene
 
 
@@ -63,7 +63,7 @@ def check(scene: SceneLike) -> Checked:
     >>> catenary.check("en50318_2002")
     []
     """
-    from catenary.cases.run.at_rest.static_table import check_line
+    from catenary.cases.run.at_rest import check_line
 
     found = check_line(checked(scene))
     return Checked(found.warnings, found.sentences)
@@ -127,7 +127,7 @@ class Plan:
         return list(self._own.warnings)
 
     def __str__(self) -> str:
-        from catenary.cases.run.planning.plan import plan_text
+        from catenary.cases.run.plan import plan_text
 
         return plan_text(self._own)
 
@@ -158,7 +158,7 @@ def plan(scene: SceneLike) -> Plan:
     en50318_2002: Reference model of EN 50318:2002
     ...
     """
-    from catenary.cases.run.planning.plan import make_plan
+    from catenary.cases.run.plan import make_plan
 
     return Plan(make_plan(checked(scene)))
 
@@ -220,7 +220,7 @@ class AtRest:
         """
         import pandas as pd
 
-        from catenary.cases.scene.problem import problem_of
+        from catenary.cases.scene.scene import problem_of
         from catenary.meshgen.wires import Role
 
         names = [wire.name for wire in problem_of(self._scene).line.wires_of(Role.CONTACT)]
@@ -317,7 +317,7 @@ class AtRest:
         import xarray as xr
 
         from catenary.callers import listed
-        from catenary.cases.studies.sensitivity.at_rest import rest_sensitivity_of
+        from catenary.cases.studies.sensitivity.derivatives import rest_sensitivity_of
 
         names = listed(parameters, "parameters")
         found = rest_sensitivity_of(self._scene, names, droppers=droppers)
@@ -351,7 +351,7 @@ class AtRest:
         )
 
     def __str__(self) -> str:
-        from catenary.cases.run.at_rest.static_table import rest_text
+        from catenary.cases.run.at_rest import rest_text
 
         return rest_text(self._scene, self._data)
 
@@ -382,7 +382,7 @@ def static(scene: SceneLike) -> AtRest:
      span  in span [m]  length [m]  force [N]
     ...
     """
-    from catenary.cases.run.at_rest.static_table import static_table
+    from catenary.cases.run.at_rest import static_table
 
     own = checked(scene)
     return AtRest(own, static_table(own))
@@ -400,6 +400,6 @@ def write_rest(rest: AtRest, file: Path, registration: bool = False) -> None:
     RunBroken
         If the disk refuses.
     """
-    from catenary.cases.run.at_rest.static_table import write_static
+    from catenary.cases.run.at_rest import write_static
 
     write_static(file, rest._data, registration)

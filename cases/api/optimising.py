@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from catenary.base.lone_process import alone
+from catenary.base.process import alone
 from catenary.callers import (
     ending_as_python,
     folder_of,
@@ -18,7 +18,7 @@ from catenary.callers import (
 )
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.task_files import read_task
-from catenary.cases.studies.tolerance.task import ToleranceTask
+from catenary.cases.studies.tolerance.errors import ToleranceTask
 from catenary.scenes import Scene, SceneLike, draft_of, scene_of, tables_or_file
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from catenary.base.lone_process import alone
 from catenary.base.parallel import on_root
+from catenary.base.process import alone
 from catenary.callers import (
     ending_as_python,
     folder_of,

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.files import is_folder
 from catenary.base.options import option
 from catenary.base.parallel import on_root
-from catenary.base.paths import is_folder
 from catenary.callers import (
     communicator,
     folder_of,

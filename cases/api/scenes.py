@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from catenary.base.errors import InputError
 from catenary.callers import path_of
-from catenary.cases.scene.input.case_files import titles
+from catenary.cases.scene.input.case_files import REMOVED, titles, value_at
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import DEEPEST
-from catenary.cases.scene.input.toml_input import REMOVED, value_at
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
+from catenary.cases.scene.keys.keys import is_known, known_keys, unknown_key
 from catenary.cases.scene.load import Draft, read_draft
-from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.scene import Scene as CheckedScene
+from catenary.cases.scene.scene import resolved
 
 if TYPE_CHECKING:
     import pandas as pd

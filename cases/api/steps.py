@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.base.lone_process import alone
+from catenary.base.process import alone
 from catenary.callers import is_truth, number_of, numbers_of, path_of
 from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.scene.input.faults import shown

@@ -16,9 +16,9 @@ import typer
 
 import catenary
 from catenary.base.errors import InputError
-from catenary.base.paths import is_folder
-from catenary.cases.cli import completion
-from catenary.cases.cli.varied_words import Verb
+from catenary.base.files import is_folder
+from catenary.cases.cli import command_words
+from catenary.cases.cli.command_words import Verb
 from catenary.cases.result_folder.output_folder import run_folder
 from catenary.cases.terminal import console
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import RunOptions
-    from catenary.postproc.read.records import Records
+    from catenary.postproc.read.validation import Records
     from catenary.postproc.report.study_table import Content
 
     Command = Callable[..., int | None]
@@ -77,7 +77,7 @@ Case = Annotated[
     str,
     typer.Argument(
         help="Name of a shipped case, or a case.toml, or a folder with one.",
-        autocompletion=completion.cases,
+        autocompletion=command_words.cases,
     ),
 ]
 Assignments = Annotated[
@@ -86,7 +86,7 @@ Assignments = Annotated[
         "--set",
         metavar="KEY=VALUE",
         help="Replace a key of the scene, KEY= takes it away; repeatable.",
-        autocompletion=completion.assignments,
+        autocompletion=command_words.assignments,
     ),
 ]
 
@@ -102,7 +102,7 @@ MoreAssignments = Annotated[
     typer.Argument(
         metavar="KEY=VALUE",
         help="Further assignments after --set.",
-        autocompletion=completion.assignments,
+        autocompletion=command_words.assignments,
     ),
 ]
 Shortened = Annotated[
@@ -120,7 +120,7 @@ MoreAndPetscOptions = Annotated[
     typer.Argument(
         metavar="KEY=VALUE -- PETSC_OPTION",
         help="Further assignments after --set, and after -- options for PETSc.",
-        autocompletion=completion.assignments,
+        autocompletion=command_words.assignments,
     ),
 ]
 
@@ -211,7 +211,7 @@ Vary = Annotated[
     typer.Option(
         "--vary",
         metavar="KEY=V1,V2,...",
-        autocompletion=completion.assignments,
+        autocompletion=command_words.assignments,
         help="Values that a key takes; all combinations are run. Repeatable, or further keys with "
         "several values follow directly; a word with a single value is an assignment.",
     ),
@@ -260,7 +260,7 @@ class StudyRuns:
 def _version(wanted: bool) -> None:
     """Print all versions and end, with ``--version``."""
     if wanted:
-        from catenary.cases.process.versions import versions_text
+        from catenary.cases.process.libraries import versions_text
 
         console.say(versions_text())
         raise typer.Exit

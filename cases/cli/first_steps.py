@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.cases.cli import completion
+from catenary.cases.cli import command_words
 from catenary.cases.cli.app import serial_verb
 from catenary.cases.terminal import console
 
@@ -42,7 +42,7 @@ def list_cases(
         str | None,
         typer.Argument(
             metavar="FILTER",
-            autocompletion=completion.keys,
+            autocompletion=command_words.keys,
             help="With --keys: a part of a key, or a pattern with * and ?; prints bounds, accepted "
             "words and typical values too. With --rules: a book, whose criteria and limits are "
             "printed.",
@@ -116,7 +116,7 @@ def new(
             "--topology",
             help="Kind of line: simple, stitched, compound, twin, twin_messenger, single, tramway, "
             "conductor_rail, or a case to begin with.",
-            autocompletion=completion.beginnings,
+            autocompletion=command_words.beginnings,
         ),
     ] = None,
     spans: Annotated[
@@ -146,7 +146,7 @@ def new(
         """Find the pre-sag of planned lengths."""
         if droppers is None:
             return
-        from catenary.cases.run.at_rest.planned_lengths import take_in_lengths
+        from catenary.cases.run.planned_lengths import take_in_lengths
 
         left = take_in_lengths(inner)
         if left is not None:

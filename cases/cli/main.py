@@ -11,11 +11,7 @@ import typer
 
 from catenary.cases.cli import app as application
 from catenary.cases.cli import run  # noqa: F401  (adds its verbs)
-from catenary.cases.process import (
-    interrupts,
-    library_settings,
-    matplotlib_setup,
-)
+from catenary.cases.process import interrupts, libraries
 from catenary.cases.terminal import console
 
 # Verbs of ``run``. They take no other file: a user waits for the first step of a run.
@@ -27,9 +23,9 @@ def all_verbs() -> typer.Typer:
     """The application with all verbs."""
     # Each of these files adds its verbs, in this order of --help.
     # isort: off
-    from catenary.cases.cli import plan, line, results  # noqa: F401
-    from catenary.cases.cli.studies import sweep, optimise, questions  # noqa: F401
-    from catenary.cases.cli.studies import numerics, reference, parameters  # noqa: F401
+    from catenary.cases.cli import preparation, results  # noqa: F401
+    from catenary.cases.cli.studies import variants, questions  # noqa: F401
+    from catenary.cases.cli.studies import verification, parameters  # noqa: F401
     from catenary.cases.cli.studies import waves  # noqa: F401
     from catenary.cases.cli import first_steps  # noqa: F401
 
@@ -65,12 +61,12 @@ def main() -> None:
     from catenary.base.parallel import launched_by_mpirun
 
     console.open_closed_streams()
-    library_settings.choose()
+    libraries.choose_settings()
     logging.getLogger("catenary").addHandler(console.LogHandler())
     interrupts.install(several_ranks=launched_by_mpirun())
-    matplotlib_setup.choose_folder()
-    matplotlib_setup.leave_out_settings()
-    if too_little := library_settings.too_little_memory():
+    libraries.choose_matplotlib_folder()
+    libraries.leave_out_matplotlibrc()
+    if too_little := libraries.too_little_memory():
         console.complain(too_little)
         sys.exit(console.BAD_INPUT)
     try:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import CatenaryError, InputError
-from catenary.base.paths import is_file, is_folder
+from catenary.base.files import is_file, is_folder
 from catenary.cases.cli.app import Force, RunFolder, folder_option, records_of, serial_verb
 from catenary.cases.terminal import console
 from catenary.postproc.files.own_files import RUN_FILE
@@ -17,7 +17,7 @@ from catenary.postproc.film.options import View
 
 if TYPE_CHECKING:
     from catenary.mbs.shape import Shape
-    from catenary.postproc.read.records import Records
+    from catenary.postproc.read.validation import Records
 
 
 Motion = Annotated[
@@ -77,12 +77,13 @@ def report(
     """Serial."""
     records = records_of(folder)
     console.alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.full_report.scene_of_run import (
+    from catenary.cases.studies.full_report import (
         SceneOfRun,
+        full_sections,
         measured_costs,
         measured_errors,
+        statement_in,
     )
-    from catenary.cases.studies.full_report.sections import full_sections, statement_in
     from catenary.postproc.read.results import Results
     from catenary.postproc.report.report import write_report
     from catenary.postproc.report.sections.run_facts import INPUT
@@ -179,26 +180,26 @@ def _compare_measured(
     folder: Path, file: Path, description: Path | None, out: Path | None, force: bool
 ) -> None:
     """Compare a run with a measured passage. Serial."""
-    from catenary.cases.studies.measured.description import read_description
+    from catenary.cases.studies.measured import read_description
 
     wanted = None if description is None else read_description(description)
     from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.cases.studies.measured.passages import passage_of, read_table, usual_description
-    from catenary.postproc.measurements import output
+    from catenary.cases.studies.measured import passage_of, read_table, usual_description
+    from catenary.postproc.measurements import compared
     from catenary.postproc.measurements.comparison import compare_with
     from catenary.postproc.read.results import Results
 
     if out is not None:
-        refuse_table(out / output.PAGE, force)
+        refuse_table(out / compared.PAGE, force)
     table = read_table(file)
     if wanted is None:
         wanted = usual_description(table, file)
     beside = (description or file).parent
     with Results(folder, records_of(folder)) as results:
         found = compare_with(results, passage_of(table, file, wanted, beside, results))
-    console.say(output.as_text(found))
+    console.say(compared.as_text(found))
     if out is not None:
-        console.say("\n" + "\n".join(map(str, output.write(out, found))))
+        console.say("\n" + "\n".join(map(str, compared.write(out, found))))
 
 
 @serial_verb(
@@ -286,8 +287,7 @@ def paraview(
     """Serial."""
     import shutil
 
-    from catenary.postproc.paraview.open_in_paraview import write_script
-    from catenary.postproc.paraview.state import PROGRAM, write_state
+    from catenary.postproc.paraview.open_in_paraview import PROGRAM, write_script, write_state
 
     records = records_of(folder)
     script, *others = write_script(folder, records, motion, _shapes(folder, records), view)
@@ -310,7 +310,7 @@ def paraview(
 def _shapes(folder: Path, records: Records | None) -> list[Shape] | None:
     """Shapes of the pantographs of a run, None if its scene is not one of this version."""
     from catenary.cases.scene.load import recorded_scene
-    from catenary.cases.scene.problem import problem_of
+    from catenary.cases.scene.scene import problem_of
     from catenary.mbs.shape import shape_of
     from catenary.postproc.read.results import Results
 

@@ -32,7 +32,7 @@ from catenary.cases.terminal import console
 
 if TYPE_CHECKING:
     import catenary
-    from catenary.cases.run.planning.slurm_script import SlurmJob
+    from catenary.cases.run.cluster import SlurmJob
     from catenary.cases.scene.scene import Scene
 
 
@@ -58,7 +58,7 @@ def run(
     from catenary.cases.scene.load import load_scene
 
     if study:
-        from catenary.cases.cli.studies.sweep import run_study
+        from catenary.cases.cli.studies.variants import run_study
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")
@@ -74,7 +74,7 @@ def run(
         return load_scene(words.case, changes, words.shortened), options
 
     comm, scene, arguments = begin(read, runs.verbose, lambda scene: scene)
-    from catenary.cases.run.describe.arrivals import arrival_warnings
+    from catenary.cases.run.arrivals import arrival_warnings
     from catenary.runs import run_into
     from catenary.solver.problem.problem import OFF
 
@@ -242,7 +242,7 @@ def submit(
     """Serial."""
     import shutil
 
-    from catenary.cases.run.planning.slurm_script import SlurmJob, slurm_script
+    from catenary.cases.run.cluster import SlurmJob, slurm_script
     from catenary.cases.scene.input.case_files import find_case, shipped
 
     refuse_impossible(out)
@@ -291,10 +291,10 @@ def submit(
 
 def _needs_on(scene: Scene, job: SlurmJob) -> tuple[float, float]:
     """Time of the march on the ranks of a job [s], and memory of its fullest node [B]."""
-    from catenary.cases.run.planning.many_ranks import march_on
-    from catenary.cases.run.planning.plan import make_plan
-    from catenary.cases.scene.cost_model import MEMORY_OF_RANK_PER_UNKNOWN
-    from catenary.cases.scene.problem import problem_of
+    from catenary.cases.run.cluster import march_on
+    from catenary.cases.run.plan import make_plan
+    from catenary.cases.scene.checks.mesh_size import MEMORY_OF_RANK_PER_UNKNOWN
+    from catenary.cases.scene.scene import problem_of
     from catenary.postproc.evaluate.wording import duration
 
     plan = make_plan(scene)
@@ -320,9 +320,9 @@ def _array_script(
     study: bool,
 ) -> str:
     """The script of a sweep or study whose scenes are all checked."""
-    from catenary.cases.cli.studies.sweep import read_variants
-    from catenary.cases.run.planning.needs import total_needs
-    from catenary.cases.run.planning.slurm_script import array_script
+    from catenary.cases.cli.studies.variants import read_variants
+    from catenary.cases.run.cluster import array_script
+    from catenary.cases.run.needs import total_needs
     from catenary.cases.studies.case_study import make_plan
     from catenary.cases.studies.sweep.sweep import whole_runs_of
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from catenary.base.lone_process import SETTINGS
+from catenary.base.process import SETTINGS
 
 OK, MISSING, BROKEN = "OK", "missing", "broken"
 # No part answers later than this on a machine that works [s].

@@ -116,8 +116,7 @@ def start_petsc(arguments: Sequence[str]) -> None:
     """
     import petsc4py
 
-    from catenary.base.lone_process import settings
-    from catenary.base.python_signals import python_signals_kept
+    from catenary.base.process import python_signals_kept, settings
 
     running = "petsc4py.PETSc" in sys.modules
     try:
@@ -195,7 +194,7 @@ def idle_options(of_scene: Collection[str]) -> list[str]:
     of_scene : names of the scene's ``[petsc]`` table, which has correct names alone; no sentence
         is made of them
     """
-    from catenary.cases.scene.run.petsc import PetscTable
+    from catenary.cases.scene.run.numerics import PetscTable
 
     known = [*PetscTable.model_fields, *_OTHER_OPTIONS]
     sentences = []

@@ -12,10 +12,10 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from catenary.base.errors import CatenaryError, RunBroken
-from catenary.base.lone_process import alone
 from catenary.base.options import command_line
 from catenary.base.parallel import NO_MEMORY
-from catenary.cases.process import interrupts, library_settings, matplotlib_setup
+from catenary.base.process import alone
+from catenary.cases.process import interrupts, libraries
 
 
 def serve(connection_number: int, life_number: int) -> None:
@@ -26,9 +26,9 @@ def serve(connection_number: int, life_number: int) -> None:
     connection_number, life_number : descriptors of the connection to the process that started this
         one, and of a pipe that it holds open as long as this one is to live
     """
-    library_settings.choose()
-    matplotlib_setup.choose_folder()
-    matplotlib_setup.leave_out_settings()
+    libraries.choose_settings()
+    libraries.choose_matplotlib_folder()
+    libraries.leave_out_matplotlibrc()
     # A signal amid the work of Pydantic's serializer is an error to it, of which it warns.
     warnings.filterwarnings("ignore", message="Pydantic serializer warnings")
     interrupts.install(several_ranks=False)

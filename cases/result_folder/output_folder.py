@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from catenary.base.errors import InputError
+from catenary.base.files import is_folder, is_there, new_part, part_of
 from catenary.base.options import option
-from catenary.base.paths import is_folder, is_there
-from catenary.base.whole_files import new_part, part_of
 from catenary.cases.result_folder.folder_lock import is_alive, refusal
 from catenary.postproc.evaluate.wording import duration
 from catenary.postproc.files.own_files import (

@@ -13,15 +13,14 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.base.files import is_there
 from catenary.base.options import option
-from catenary.base.paths import is_there
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, resolved
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.committed_rows import fault_to_continue
-from catenary.postproc.files.hdf5.self_contained import open_own
+from catenary.postproc.files.hdf5 import open_own
 from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from catenary.cases.run.describe.arrivals import end_sentences
+from catenary.cases.run.arrivals import end_sentences
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.views.observers import Observer

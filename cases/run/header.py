@@ -6,18 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from catenary.cases.process.versions import versions
-from catenary.cases.run.describe.arrivals import arrival_facts
-from catenary.cases.run.describe.defects import defect_facts, incident_facts
-from catenary.cases.run.describe.pantographs import header_words
-from catenary.cases.run.planning.plan import effect_rows
-from catenary.cases.scene.problem import resolved
+from catenary.cases.process.libraries import versions
+from catenary.cases.run.arrivals import arrival_facts
+from catenary.cases.run.description import defect_facts, header_words, incident_facts
+from catenary.cases.run.plan import effect_rows
 from catenary.cases.scene.run.case import rule_entries
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, resolved
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
+from catenary.solver.statics.form_finding import lengths_to_cut
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.window.choice import window_sentence
 

@@ -8,12 +8,10 @@ from pathlib import Path
 import catenary.solver.kernels
 from catenary.base.mpi import MPI
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.problem import problem_of
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, problem_of
 from catenary.solver.effects.effect import Limit
 from catenary.solver.problem.problem import slowest_wave_speed
-from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
-from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest, refuse_lost_wire
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.prepared_line import write_line
 

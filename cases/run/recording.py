@@ -11,8 +11,8 @@ from catenary.mbs.build import has_joints
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.line_record import GZIP, NONE, LineRecord, record_words
-from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS
+from catenary.postproc.channels.header import GZIP, NONE, LineRecord, record_words
+from catenary.postproc.record.snapshots.contents import USUAL_FIELDS
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.effects.shipped.axial_effects import moves_along

@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catenary.base.errors import CatenaryError, RunBroken
-from catenary.base.freed_memory import give_back
 from catenary.base.parallel import on_root
 from catenary.base.petsc import PETSc
+from catenary.base.process import give_back
 from catenary.cases.process.interrupts import Phase, StopRequest
 from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import (
@@ -33,28 +33,21 @@ from catenary.cases.result_folder.output_folder import (
     prepare,
 )
 from catenary.cases.run.header import header_of
-from catenary.cases.run.planning.needs import (
-    flush_cadence,
-    needs_before_meshing,
-    needs_with_mesh,
-    run_size,
-)
+from catenary.cases.run.needs import flush_cadence, needs_before_meshing, needs_with_mesh, run_size
 from catenary.cases.run.recording import FIELD_EVERY, extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.problem import problem_of
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, problem_of
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.header import Header
-from catenary.postproc.files.filtered_force import ForceFilter
+from catenary.postproc.files.committed_rows import ForceFilter
 from catenary.postproc.files.own_files import RUN_FILE, remove_stale
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.run_watch import RunWatch, StripWatch
-from catenary.postproc.record.snapshots.blocks import RecordedLine
+from catenary.postproc.record.snapshots.contents import RecordedLine
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.problem.problem import OFF, Problem
-from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
-from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all, refuse_lost_wire
 from catenary.solver.time_loop.march import March, Outcome
 from catenary.solver.time_loop.views.observers import Observer
 
@@ -476,7 +469,7 @@ def _refuse_other_run(
     order: _Order, header: Header | None, problem: Problem, at_rest: LineAtRest
 ) -> None:
     from catenary.cases.run.continuing import refuse_other_run, refuse_other_state
-    from catenary.postproc.files.later_end import CHANGED
+    from catenary.postproc.files.result_file import CHANGED
 
     assert header is not None and order.state is not None
     n_strips = tuple(len(place.data.strips.offsets) for place in problem.train.placements)
@@ -485,7 +478,7 @@ def _refuse_other_run(
 
 
 def _extend_run(order: _Order, header: Header | None, n_steps: int) -> None:
-    from catenary.postproc.files.later_end import extend_run
+    from catenary.postproc.files.result_file import extend_run
 
     assert header is not None
     extend_run(order.result, header, n_steps)
@@ -495,7 +488,7 @@ def _begun_for(order: _Order) -> int | None:
     """Steps for which a run was begun that got a later end, None if it did not."""
     if not order.resume:
         return None
-    from catenary.postproc.files.later_end import BEGUN_FOR
+    from catenary.postproc.files.result_file import BEGUN_FOR
     from catenary.postproc.read.results import Results
 
     with Results(order.result) as results:

@@ -11,8 +11,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.scene.checks.mesh_size import MANY_NODES, size_of
-from catenary.cases.scene.problem import line_of
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, line_of
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catenary.solver.problem.problem import Problem
-    from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+    from catenary.solver.statics.form_finding import Equilibrium
 
 # Suffixes of drawings.
 DRAWN = (".png", ".svg")
@@ -81,10 +80,10 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
         If the disk refuses.
     """
     new_file(path, DRAWN, force)
-    from catenary.cases.scene.problem import problem_of
+    from catenary.cases.scene.scene import problem_of
     from catenary.postproc.files.disk import write_into
     from catenary.postproc.report.pictures.figures import file_of
-    from catenary.solver.statics.form_finding.equilibrium import find_form
+    from catenary.solver.statics.form_finding import find_form
 
     problem, mesh = problem_of(scene), mesh_of(scene)
     figure, stretch = line_figure(scene, problem, mesh, find_form(problem, mesh)[1])
@@ -102,7 +101,7 @@ def line_figure(
     problem, mesh, form : of the scene, and of its line at rest
     """
     # Matplotlib takes long to import.
-    from catenary.cases.run.describe.defects import defect_facts
+    from catenary.cases.run.description import defect_facts
     from catenary.cases.scene.line.line_data import overlaps_of
     from catenary.postproc.report.pictures.line_drawing import Mark, draw_line
 

@@ -12,19 +12,26 @@ from pydantic import ValidationError
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.checks.scene import check
-from catenary.cases.scene.input.case_files import find_case
-from catenary.cases.scene.input.csv_files import absolute_names, take_in_files
-from catenary.cases.scene.input.faults import Origin, SceneError, shown, text_faults
-from catenary.cases.scene.input.plain_text import refuse_deep
-from catenary.cases.scene.input.toml_input import (
+from catenary.cases.scene.input.case_files import (
     Assigned,
     assign,
+    find_case,
     parse_assignment,
     read_toml,
     value_at,
 )
-from catenary.cases.scene.keys.error_sentences import schema_faults, unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys, list_of, names_value, with_kinds
+from catenary.cases.scene.input.csv_files import absolute_names, take_in_files
+from catenary.cases.scene.input.faults import Origin, SceneError, shown, text_faults
+from catenary.cases.scene.input.plain_text import refuse_deep
+from catenary.cases.scene.keys.keys import (
+    is_known,
+    known_keys,
+    list_of,
+    names_value,
+    schema_faults,
+    unknown_key,
+    with_kinds,
+)
 from catenary.cases.scene.scene import Scene
 
 # Tables that are filled in: with the name and the folder of the case, and with what files hold.

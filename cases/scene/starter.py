@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from catenary.base.errors import InputError
-from catenary.base.paths import is_there
-from catenary.cases.scene.input.case_files import CASE_FILE, find_case
+from catenary.base.files import is_there
+from catenary.cases.scene.input.case_files import CASE_FILE, find_case, read_toml
 from catenary.cases.scene.input.csv_files import span_table
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.scene.input.plain_text import plain, read_text, read_whole
-from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
+from catenary.cases.scene.keys.units import USUAL, Usual, usual_range
 from catenary.cases.scene.load import load_scene
 
 

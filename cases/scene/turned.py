@@ -9,11 +9,10 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.line.line_data import numbered, overlaps_of, span_lengths
 from catenary.cases.scene.load import scene_from
-from catenary.cases.scene.problem import line_of, resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, line_of, resolved
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import SAME_PLACE
-from catenary.solver.problem.irregularities import LengthErrors
+from catenary.solver.problem.defects import LengthErrors
 
 FORWARD, BACKWARD = DIRECTIONS = ("forward", "backward")
 # Places are rounded to this [m, as decimals], so that a line which is its own mirror image is so

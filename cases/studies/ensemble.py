@@ -16,30 +16,33 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from catenary.base.errors import CatenaryError
-from catenary.base.lone_process import alone
+from catenary.base.process import alone
 from catenary.cases.run.header import header_of, scene_attributes, train_attributes
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.keys.keys import OF_THE_TRAIN
-from catenary.cases.scene.problem import problem_of, resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, problem_of, resolved
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.verdict import criteria_of
-from catenary.postproc.files.filtered_force import PATH as FILTERED
+from catenary.postproc.files.committed_rows import PATH as FILTERED
 from catenary.postproc.files.run_schema import DONE
-from catenary.postproc.read.marched_results import MarchedFile
+from catenary.postproc.read.result_tables import MarchedFile
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.line_rows import take_extremes
+from catenary.postproc.record.recorder import take_extremes
 from catenary.postproc.record.run_watch import RunWatch
 from catenary.postproc.report.summary import short_summary
-from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
-from catenary.solver.ensemble.shared_line import SharedLine, why_alone
+from catenary.solver.ensemble import SceneHistory, SharedLine, march_side_by_side, why_alone
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import EXACT, Problem, WindowChoice
-from catenary.solver.statics.line_at_rest import LineAtRest, SoundLine, line_at_rest, sound_line
-from catenary.solver.statics.stability_of_rest import refuse_lost_wire
+from catenary.solver.statics.line_at_rest import (
+    LineAtRest,
+    SoundLine,
+    line_at_rest,
+    refuse_lost_wire,
+    sound_line,
+)
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView

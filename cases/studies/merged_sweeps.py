@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from catenary.base.errors import InputError
-from catenary.base.paths import is_there
+from catenary.base.files import is_there
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.histories import FILE as HISTORIES
 from catenary.cases.studies.sweep.histories import merge_histories
 from catenary.cases.studies.sweep.output import RECORD, table_files
-from catenary.cases.studies.sweep.same_scene import other_value
+from catenary.cases.studies.sweep.sweep import other_value
 from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import Uncertainty
 from catenary.cases.studies.uncertainty.run_table import read_sampling_beside

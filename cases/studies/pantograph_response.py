@@ -12,14 +12,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
-from catenary.cases.run.describe.pantographs import description_of
-from catenary.cases.scene.problem import pantograph_of, static_force
-from catenary.cases.scene.scene import Scene
+from catenary.cases.run.description import description_of
+from catenary.cases.scene.scene import Scene, pantograph_of, static_force
 from catenary.cases.studies.asked import Frequencies
 from catenary.mbs.build import PantographData
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
-from catenary.mbs.response.frequency_response import HeadResponse, head_response, peaks
-from catenary.mbs.response.lumped_fit import ChainFit, fit_chain
+from catenary.mbs.response import ChainFit, HeadResponse, fit_chain, head_response, peaks
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.report.pictures.figures import (
     COLOURS,

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
+from catenary.base.files import is_file
 from catenary.base.parallel import on_root
-from catenary.base.paths import is_file
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.workers import Outcome, each, in_order
 from catenary.cases.result_folder.output_folder import remove_dead_parts

@@ -11,7 +11,7 @@ import numpy as np
 
 from catenary.base.mpi import MPI
 from catenary.base.parallel import wait_for_all
-from catenary.cases.run.planning.many_ranks import Sizes, Wire, Work, predict
+from catenary.cases.run.cluster import Sizes, Wire, Work, predict
 from catenary.postproc.report.study_table import Column, StudyTable
 
 # Sizes of messages that latency and bandwidth are found from [B].

@@ -15,12 +15,11 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from catenary.base.errors import InputError
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.workers import Pool, cores, in_order
-from catenary.cases.scene.input.toml_input import parse_assignment
+from catenary.cases.scene.input.case_files import parse_assignment
 from catenary.cases.scene.keys.table import Table
 from catenary.cases.scene.line.imperfections import Seed
 from catenary.cases.scene.load import Draft
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, resolved
 from catenary.cases.scene.turned import FORWARD, turned
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import OF_LINE, STATISTICS, statistics_of
@@ -387,7 +386,7 @@ _marches: Marches | None = None
 
 
 def _summaries(scenes: Sequence[Scene], comm: Any = None) -> list[dict[str, Any]]:
-    from catenary.base.lone_process import alone
+    from catenary.base.process import alone
     from catenary.cases.process.petsc_options import options_of
 
     alone()  # starts MPI as one process, before anything imports it

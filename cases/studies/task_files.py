@@ -9,11 +9,10 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.input.faults import Origin, text_faults
 from catenary.cases.scene.input.plain_text import refuse_deep
-from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.keys.error_sentences import schema_faults
-from catenary.cases.scene.keys.keys import known_keys
+from catenary.cases.scene.keys.keys import known_keys, schema_faults
 
 Model = TypeVar("Model", bound=BaseModel)
 _OF_SCENES = "; see `catenary list --keys` for all keys"

@@ -19,12 +19,12 @@ import typer
 from typer.models import ArgumentInfo
 
 from catenary.base.errors import CatenaryError, InputError
-from catenary.base.lone_process import alone as alone
-from catenary.base.lone_process import world as world
 from catenary.base.options import Flag, command_line
 from catenary.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
+from catenary.base.process import alone as alone
+from catenary.base.process import world as world
 from catenary.cases.scene.input.plain_text import plain, shown
-from catenary.postproc.evaluate.terminal_width import folded, terminal_width
+from catenary.postproc.evaluate.wording import folded, terminal_width
 from catenary.postproc.files.disk_errors import reason
 
 DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3

@@ -18,14 +18,20 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
 from catenary.cases.scene.keys.table import OneOrMore
-from catenary.cases.scene.keys.units import unit_of
-from catenary.cases.scene.keys.usual_values import USUAL, Usual, usual_range
+from catenary.cases.scene.keys.units import USUAL, Usual, unit_of, usual_range
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.topologies.all_topologies import registered
-from catenary.postproc.evaluate.terminal_width import terminal_width
-from catenary.postproc.standards.book import Rule, RuleBook
-from catenary.postproc.standards.library import DEFAULT, book_named, editions_of, shipped
-from catenary.postproc.standards.quantities import QUANTITIES, SYSTEMS
+from catenary.postproc.evaluate.wording import terminal_width
+from catenary.postproc.standards.rule_books import (
+    DEFAULT,
+    QUANTITIES,
+    SYSTEMS,
+    Rule,
+    RuleBook,
+    book_named,
+    editions_of,
+    shipped,
+)
 from catenary.solver.effects import all_effects as effects
 
 # Words that a check takes, where the key's type is plain text.

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from catenary.mbs.control import Controller, Regulation, Regulator
-from catenary.mbs.head.head_arrays import N_DRIVE, drive_width, named
-from catenary.mbs.head.laws import Law, in_place
+from catenary.mbs.head.laws import Controller, Law, Regulation, Regulator, in_place
 from catenary.mbs.head.stepping import Part, Raising, Stepping
 from catenary.mbs.head.strips import HeadParts
-from catenary.mbs.interface import HeadState
+from catenary.mbs.interface import N_DRIVE, HeadState, drive_width, named
 from catenary.solver.kernels import native
 
 # A step that takes no time: what it finds are the accelerations of the state as it is.

@@ -1,15 +1,19 @@
-"""Steps in which a pantograph runs, and what moves it in them besides its contact forces."""
+"""Steps in which a pantograph runs, and what moves it in them besides its contact forces.
+
+It is raised, its base moves, and the wire crosses its strips: at its own lateral place less the
+vehicle's sway.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from catenary.mbs.head.wire_crossing import CrossingPath
-from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle import BaseMotion
+from catenary.solver.kernels import native
 
 # Part of the lift that acts at times [s], shape as these.
 Part = Callable[[float | np.ndarray], np.ndarray]
@@ -56,3 +60,91 @@ class Stepping(NamedTuple):
     gamma: float = 0.5
     lateral: CrossingPath | None = None
     base: BaseMotion | None = None
+
+
+class CrossingPath:
+    """Lateral positions of wires on the strips of a pantograph.
+
+    Attributes
+    ----------
+    place, rate : (n,) of the contacts [m] and [m/s], to the left of the strips' middle, strip by
+        strip
+
+    Parameters
+    ----------
+    n : number of contacts
+    base : how the vehicle moves, None if it does not
+    """
+
+    def __init__(self, n: int, base: BaseMotion | None) -> None:
+        self._n, self._base = n, base
+        self._row = np.zeros((1, 2 * n))
+        self.place, self.rate = self._row.reshape(2, n)
+
+    def fill_ahead(self, times: np.ndarray, rows: np.ndarray) -> None:
+        """Fill in what is known of ``times`` (t,) [s] ahead of their steps: ``rows`` (t, 2 n),
+        places, then rates."""
+        rows[:] = 0.0
+        if self._base is not None:
+            sways = np.array([self._base.lateral(time)[:2] for time in times.tolist()])
+            rows -= np.repeat(sways, self._n, axis=1)
+
+    def move_to(self, time: float) -> None:
+        """Put ``place`` and ``rate`` to ``time`` [s]."""
+        self.fill_ahead(np.array([time]), self._row)
+
+
+class LateralPath(CrossingPath):
+    """Lateral positions of wires that do not move sideways, as functions of time.
+
+    Parameters
+    ----------
+    courses : of each wire places along the track and across it (n,) [m], straight in between
+    start : of the pantograph at time 0 [m]
+    offsets : (s,) places of its strips ahead of it [m]
+    speed : of the train [m/s]
+    base : how the vehicle moves, None if it does not
+    """
+
+    def __init__(
+        self,
+        courses: Sequence[tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]],
+        start: float,
+        offsets: Sequence[float],
+        speed: float,
+        base: BaseMotion | None = None,
+    ) -> None:
+        super().__init__(len(offsets) * len(courses), base)
+        self._start, self._speed = start + np.array(offsets, dtype=float), speed
+        self._courses = [(np.array(x, dtype=float), np.array(y, dtype=float)) for x, y in courses]
+
+    def fill_ahead(self, times: np.ndarray, rows: np.ndarray) -> None:
+        """Fill in all there is."""
+        super().fill_ahead(times, rows)
+        along = self._start + self._speed * times[:, None]
+        place, slope = np.empty((2, *along.shape))
+        for wire, course in enumerate(self._courses):
+            native.polyline_at(*course, along.ravel(), place.ravel(), slope.ravel())
+            rows[:, wire : self._n : len(self._courses)] += place
+            rows[:, self._n + wire :: len(self._courses)] += self._speed * slope
+
+
+class FollowedPath(CrossingPath):
+    """Lateral positions of wires that move sideways, whose motion each step finds.
+
+    Parameters
+    ----------
+    across : (2, n) where the wires are across the track [m] and how fast that changes where the
+        strips are [m/s]; kept by reference
+    base : how the vehicle moves, None if it does not
+    """
+
+    def __init__(self, across: np.ndarray, base: BaseMotion | None = None) -> None:
+        super().__init__(across.shape[1], base)
+        self._across = across
+
+    def move_to(self, time: float) -> None:
+        """Put ``place`` and ``rate`` to ``time`` [s]."""
+        super().move_to(time)
+        self.place += self._across[0]
+        self.rate += self._across[1]

@@ -23,7 +23,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from catenary.mbs.head.head_arrays import spline_tables
+from catenary.mbs.interface import spline_tables
 from catenary.solver.kernels import native
 
 # Points of the tables of modes along half a wave of the highest one.

@@ -18,16 +18,13 @@ from catenary.mbs.air import ON_FRAME, ON_HEAD, SQUARE, AirForces
 from catenary.mbs.head.stepping import Part, Raising, Stepping
 from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
-from catenary.mbs.rigid.bodies import SPACE, Motion
+from catenary.mbs.rigid.bodies import SPACE, Motion, body_products
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.rigid.implicit_steps import Stepper
+from catenary.mbs.rigid.implicit_steps import Stepper, StepSolver
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, steady
-from catenary.mbs.rigid.kinematics import body_products
-from catenary.mbs.rigid.spin_locks import without_spins
 from catenary.mbs.rigid.statics import equilibrium, held_force
-from catenary.mbs.rigid.step_solvers import StepSolver
-from catenary.mbs.rigid.system import System
-from catenary.mbs.vehicle.base_motion import BaseMotion, lifted
+from catenary.mbs.rigid.system import System, without_spins
+from catenary.mbs.vehicle import BaseMotion, lifted
 from catenary.solver.kernels import native
 
 ARM, HEAD = "arm held at its place", "head moved from its place"

@@ -19,18 +19,16 @@ from catenary.mbs.air import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning
 from catenary.mbs.mechanism.reduction import Raised, ReducedMechanism, reduce_mechanism
-from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper, gradient_of
-from catenary.mbs.rigid.joints import Constant, PrescribedPoint
-from catenary.mbs.rigid.least_squares import least_squares
+from catenary.mbs.rigid.joints import Constant, Joint, PrescribedPoint
 from catenary.mbs.rigid.statics import (
     Calibration,
     calibrate_actuator,
     equilibrium,
     unheld_force,
 )
-from catenary.mbs.rigid.system import Miss, System
+from catenary.mbs.rigid.system import Miss, System, least_squares
 
 logger = logging.getLogger("catenary.multibody")
 

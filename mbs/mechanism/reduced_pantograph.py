@@ -26,7 +26,7 @@ from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import ONE_STRIP, Strips, head_parts
 from catenary.mbs.mechanism.multibody_pantograph import Head
 from catenary.mbs.mechanism.reduction import ReducedMechanism
-from catenary.mbs.vehicle.base_motion import lifted
+from catenary.mbs.vehicle import lifted
 from catenary.solver.kernels import native
 
 

@@ -16,15 +16,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.head.head_arrays import spline_tables, tables_at
-from catenary.mbs.rigid.arrays import ORIGIN
-from catenary.mbs.rigid.bodies import Motion, Vector
+from catenary.mbs.interface import spline_tables, tables_at
+from catenary.mbs.rigid.bodies import Law, Motion, Vector, point
 from catenary.mbs.rigid.forces import Actuator, PointForce, gradient_of
-from catenary.mbs.rigid.joints import PrescribedPoint
-from catenary.mbs.rigid.kinematics import Law, point
-from catenary.mbs.rigid.least_squares import least_squares, null_space
+from catenary.mbs.rigid.joints import ORIGIN, PrescribedPoint
 from catenary.mbs.rigid.statics import at_rest
-from catenary.mbs.rigid.system import System
+from catenary.mbs.rigid.system import System, least_squares, null_space
 from catenary.solver.kernels import native
 
 # Closer than this no heights are put in [m]: a stop of 1e5 N/m is then off by some 5 N over 1 mm.

@@ -16,9 +16,8 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from catenary.base.errors import InputError
-from catenary.mbs.rigid.arrays import ORIGIN, vectors
-from catenary.mbs.rigid.bodies import Motion, Vector
-from catenary.mbs.rigid.kinematics import number_of, point
+from catenary.mbs.rigid.bodies import Motion, Vector, number_of, point
+from catenary.mbs.rigid.joints import ORIGIN, vectors
 from catenary.solver.kernels import native
 
 

@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Actuator
-from catenary.mbs.rigid.least_squares import least_squares, null_space
-from catenary.mbs.rigid.system import System
+from catenary.mbs.rigid.joints import Joint
+from catenary.mbs.rigid.system import System, least_squares, null_space
 
 # Displacement of a degree of freedom for differences of forces [m or rad].
 STEP = 1e-5

@@ -7,12 +7,27 @@ in velocities v and angular velocities in body axes, so that M is constant, bloc
 regular, and Euler parameters need no equation but their rates and p^T p = 1. Joints act on bodies
 with -Phi_q^T lambda.
 
+Least squares and null spaces of its small matrices are found by QR with pivoting (LAPACK's gelsy
+and geqp3). SciPy's defaults find singular values by divide and conquer, which fails on a rare
+matrix however well conditioned it is ("SVD did not converge"; seen with 36 equations in 34 unknowns
+whose singular values are 0.02 to 3).
+
+A system may be set up the other way round, by half a turn about the vertical: bodies, joints and
+forces between them are the same; what is given in space (places, orientations, points and axes of
+joints to the ground) turns with them. Forces whose direction is fixed in space, such as the wind's,
+keep it: they meet a pantograph that runs knee first where they met one that runs knee trailing.
+
+The idle rotation of links between two balls may be locked. Nothing drives such a spin and little
+resists it; a link whose mass lies above the line between its balls tips over by itself, which no
+real link with its bolts does. Reduced mechanisms leave spins out; locks leave them out of systems
+with all bodies.
+
 Sources: P. E. Nikravesh, 1988, chapters 6 and 11; Ambrosio et al., 2012, equation (3.6).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -20,11 +35,17 @@ import numpy as np
 from scipy import linalg
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.mbs.rigid.arrays import FlatRows, Joint
-from catenary.mbs.rigid.bodies import Body, Motion, initial_motion
+from catenary.mbs.rigid.bodies import SPACE, Body, Motion, Quantity, Vector, initial_motion
 from catenary.mbs.rigid.forces import BetweenPoints, FlatLines, Force, OffLine
-from catenary.mbs.rigid.kinematics import Quantity
-from catenary.mbs.rigid.least_squares import least_squares
+from catenary.mbs.rigid.joints import (
+    Fixed,
+    FlatRows,
+    Joint,
+    PointOnCurve,
+    PrescribedAngle,
+    PrescribedPoint,
+    Spherical,
+)
 from catenary.solver.kernels import native
 
 # A row of Phi_q that the rows before it explain but for this part of its length is redundant.
@@ -260,3 +281,145 @@ class System:
                 f"velocities miss by {left:.3g} m/s or 1/s."
             )
         return motion.with_velocities(velocities)
+
+
+def least_squares(matrix: np.ndarray, right: np.ndarray, cond: float) -> np.ndarray:
+    """The smallest x (n,) or (n, k) for which ``matrix`` (m, n) x is nearest to ``right``.
+
+    Directions in which the matrix is smaller than ``cond`` of its size count as none. By QR with
+    pivoting, which iterates nothing.
+    """
+    return np.asarray(
+        linalg.lstsq(matrix, right, cond=cond, lapack_driver="gelsy", check_finite=False)[0]
+    )
+
+
+def null_space(matrix: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (n, k) of the null space of ``matrix`` (m, n).
+
+    Products with it are below 1e-8 of the largest row of the matrix. By QR of the rows with
+    pivoting: a third of the time of singular values.
+    """
+    if not matrix.size:
+        return np.eye(matrix.shape[1])
+    columns, triangle, _ = linalg.qr(matrix.T, pivoting=True, check_finite=False)
+    sizes = np.abs(np.diagonal(triangle))
+    rank = int((sizes > 1e-8 * sizes.max(initial=0.0)).sum())
+    return np.asarray(columns[:, rank:])
+
+
+def turned_round(system: System) -> System:
+    """Return a system after half a turn about the z axis of space. Not collective."""
+    return System(
+        tuple(_body(body) for body in system.bodies),
+        tuple(_joint(joint) for joint in system.joints),
+        tuple(_force(force) for force in system.forces),
+    )
+
+
+def _across(vector: Vector) -> tuple[float, float, float]:
+    """A vector of space after half a turn."""
+    x, y, z = (float(value) for value in vector)
+    return (-x, -y, z)
+
+
+def _parameters(parameters: np.ndarray) -> tuple[float, ...]:
+    """Euler parameters (4,) of an orientation in space after half a turn, e0 >= 0."""
+    e0, e1, e2, e3 = (float(value) for value in parameters)
+    after = (-e3, -e2, e1, e0)
+    return tuple(-value for value in after) if after[0] < 0.0 else after
+
+
+def _body(body: Body) -> Body:
+    turn = _parameters(body.parameters)[1:]
+    return replace(body, position=_across(body.position), turn=turn)
+
+
+def _joint(joint: Joint) -> Joint:
+    if isinstance(joint, PointOnCurve):
+        # Curves are given for growing x.
+        x, y = (tuple(-float(v) for v in reversed(values)) for values in (joint.x, joint.y))
+        return replace(joint, x=x, y=y, z=tuple(reversed(tuple(joint.z))))
+    if isinstance(joint, PrescribedPoint):
+        return replace(joint, along=_across(joint.along))
+    changes = _in_space(joint)
+    if isinstance(joint, Fixed) and joint.i == SPACE:
+        changes["parameters"] = _parameters(np.asarray(joint.parameters, dtype=float))
+    return replace(joint, **changes)  # type: ignore[type-var]
+
+
+def _force(force: Force) -> Force:
+    return replace(force, **_in_space(force)) if isinstance(force, BetweenPoints) else force
+
+
+def _in_space(what: Any) -> dict[str, Any]:
+    """Points and axes of a joint or force that are those of space, after half a turn."""
+    return {
+        field.name: _across(getattr(what, field.name))
+        for field in fields(what)
+        for end in ("i", "j")
+        if field.name.endswith(f"_{end}") and getattr(what, end) == SPACE
+    }
+
+
+_ACROSS, _ALONG = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+# A link closer than this to the direction across the track (a sine) is measured along it.
+_CLOSE = 0.1
+
+
+def without_spins(system: System, motion: Motion) -> System:
+    """The system with a joint more for each body that only two balls hold.
+
+    The joint keeps a vector of the body, across the line between its balls, perpendicular to the
+    direction across the track (or along it, for a link across): one row each, which lets a
+    mechanism move in its plane as before.
+
+    Parameters
+    ----------
+    system : System
+        Bodies with their joints and forces.
+    motion : Motion
+        Assembled motion, whose spins are kept.
+    """
+    holders = [
+        holder for body in system.bodies if (holder := _holder(system, body, motion)) is not None
+    ]
+    return system.with_joints(*holders)
+
+
+def _holder(system: System, body: Body, motion: Motion) -> PrescribedAngle | None:
+    joints = [
+        joint
+        for joint in system.joints
+        if body.name in (getattr(joint, key, None) for key in ("i", "j", "body"))
+    ]
+    if len(joints) != 2 or not all(isinstance(joint, Spherical) for joint in joints):
+        return None
+    ends = [
+        np.asarray(joint.at_i if joint.i == body.name else joint.at_j, dtype=float)
+        for joint in joints
+        if isinstance(joint, Spherical)
+    ]
+    rotation = motion.rotation[motion.numbers[body.name]]
+    line = rotation @ (ends[1] - ends[0])
+    length = float(np.linalg.norm(line))
+    if length == 0.0:
+        return None
+    fixed = _ACROSS
+    if np.linalg.norm(np.cross(line / length, fixed)) < _CLOSE:
+        fixed = _ALONG
+    side = np.cross(line, fixed)
+    side /= np.linalg.norm(side)
+    # The angle zero of `PrescribedAngle` about an axis a with a normal n has the row
+    # (a x n) . vector = 0: here a x n is the fixed direction.
+    normal = side
+    axis = np.cross(normal, fixed)
+    return PrescribedAngle(
+        f"no spin of {body.name}",
+        SPACE,
+        body.name,
+        0.0,
+        axis_i=tuple(axis),
+        normal_i=tuple(normal),
+        normal_j=tuple(rotation.T @ side),
+    )

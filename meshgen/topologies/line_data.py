@@ -9,8 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.meshgen.hardware import Clamps, DropperKind, Droppers, SteadyArm, SteadyArms, Supports
-from catenary.meshgen.track import Curve, Spans
+from catenary.meshgen.line import (
+    Clamps,
+    Curve,
+    DropperKind,
+    Droppers,
+    Spans,
+    SteadyArm,
+    SteadyArms,
+    Supports,
+)
 from catenary.meshgen.wires import Conductor, Role, Section
 
 # Two cuts of a wire closer than this are taken for a slip of the pen [m]: a millimetre, less the

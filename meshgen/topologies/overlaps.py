@@ -9,8 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from catenary.meshgen.hardware import Clamps, Droppers, SteadyArms, Supports
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import Clamps, Droppers, Line, SteadyArms, Supports
 from catenary.meshgen.topologies.line_data import Overlaps
 from catenary.meshgen.wires import End, Piece, Profile, Section, Wire
 

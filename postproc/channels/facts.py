@@ -21,8 +21,7 @@ from catenary.solver.time_loop.views.channels import PANTOGRAPH, RUN
 
 if TYPE_CHECKING:
     from catenary.meshgen.mesh import LineMesh
-    from catenary.solver.problem.problem import Problem
-    from catenary.solver.problem.simulated import Simulated
+    from catenary.solver.problem.problem import Problem, Simulated
 
 # Of each contact wire, in the order of the line.
 WIRE = "contact wire"
@@ -149,7 +148,7 @@ def _slowest_wave(source: Derivation) -> float:
 
 def _strongest_gust(source: Derivation) -> float:
     """Strongest gust over the mean wind, if drag of gusts is linearised; else none."""
-    from catenary.solver.wind.spectra import PEAK
+    from catenary.solver.wind import PEAK
 
     wind = source.laws.wind
     if wind is None or wind.gusts is None or wind.quadratic:

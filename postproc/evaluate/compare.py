@@ -1,4 +1,10 @@
-"""Compares runs: statistics side by side, differences by spans, histories at equal times."""
+"""Compares runs: statistics side by side, differences by spans, histories at equal times.
+
+Whether statistics of two runs differ by more than chance is told span by span: the force of a span
+is taken for a sample of what the line may show. The statistic without each span in turn, the
+jackknife, tells how far it depends on which spans there are (B. Efron, The jackknife, the bootstrap
+and other resampling plans, 1982, chapter 3).
+"""
 
 from __future__ import annotations
 
@@ -6,21 +12,16 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from string import ascii_uppercase
+from typing import NamedTuple
 
 import numpy as np
+from scipy import stats as scipy_stats
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.evaluate.span_differences import (
-    STATISTICS,
-    SpanSums,
-    differences,
-    span_sums,
-)
-from catenary.postproc.evaluate.terminal_width import terminal_width
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of, judged_by, labels
 from catenary.postproc.evaluate.wording import (
     UNCOMPARED,
@@ -28,10 +29,10 @@ from catenary.postproc.evaluate.wording import (
     counted,
     decimals_that_tell,
     fixed,
+    terminal_width,
 )
-from catenary.postproc.read.line_of_run import in_stretch
-from catenary.postproc.read.records import Records
-from catenary.postproc.read.results import Results
+from catenary.postproc.read.results import Results, in_stretch
+from catenary.postproc.read.validation import Records
 
 _FORCES = (
     ("mean [N]", "mean", 1.0),
@@ -286,3 +287,94 @@ def _histories(a: Results, b: Results, letter: str) -> str:
         f"{of_all}Largest difference of the contact force histories: {_difference(largest)} N "
         f"at t = {a.time_at(at):.4f} s ({a.pantograph_names()[whose]})."
     )
+
+
+# With fewer spans nothing is said.
+_LEAST_SPANS = 4
+STATISTICS = ("mean", "standard deviation")
+
+
+class SpanSums(NamedTuple):
+    """Number of samples of each span (n,), their sum and the sum of their squares."""
+
+    samples: np.ndarray
+    total: np.ndarray
+    square: np.ndarray
+
+
+class Difference(NamedTuple):
+    """A difference of two runs with the interval that holds it with a confidence of 95 %."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the interval excludes zero; not of runs that are alike."""
+        return not self.low <= 0.0 <= self.high
+
+
+def span_sums(position: np.ndarray, force: np.ndarray, edges: np.ndarray) -> SpanSums:
+    """Sums of a force (n,) at positions (n,) [m] between edges (m + 1,) of spans [m].
+
+    Spans without a sample are left out. A sample at the last edge belongs to the last span, as it
+    does to the evaluated stretch: means of all spans are those of the stretch.
+    """
+    n_spans = max(edges.size - 1, 0)
+    which = np.searchsorted(edges, position, side="right") - 1
+    if n_spans:
+        which[position == edges[-1]] -= 1
+    inside = (which >= 0) & (which < n_spans)
+    which, force = which[inside], force[inside]
+    sums = [np.bincount(which, weights, n_spans) for weights in (None, force, np.square(force))]
+    there = sums[0] > 0
+    return SpanSums(*(one[there].astype(float) for one in sums))
+
+
+def differences(first: SpanSums, second: SpanSums, paired: bool) -> Sequence[Difference] | None:
+    """Differences, second less first, of ``STATISTICS``; None with too few spans.
+
+    Parameters
+    ----------
+    first, second : SpanSums
+        Sums over the spans of each run.
+    paired : bool
+        Whether both are of the same spans of a line, whose common part then drops out.
+    """
+    n, m = first.samples.size, second.samples.size
+    if min(n, m) < _LEAST_SPANS or (paired and n != m):
+        return None
+    values = _statistics_by_span(second, whole=True) - _statistics_by_span(first, whole=True)
+    without = _statistics_by_span(first), _statistics_by_span(second)
+    if paired:
+        square, freedom = _jackknifed(without[1] - without[0]), np.full(len(STATISTICS), n - 1.0)
+    else:
+        own, other = _jackknifed(without[0]), _jackknifed(without[1])
+        square = own + other
+        with np.errstate(invalid="ignore"):  # Welch and Satterthwaite
+            freedom = square**2 / (own**2 / (n - 1) + other**2 / (m - 1))
+        freedom = np.nan_to_num(freedom, nan=float(min(n, m) - 1))
+    width = scipy_stats.t.ppf(0.975, freedom) * np.sqrt(square)
+    return [
+        Difference(*map(float, row))
+        for row in zip(values[:, 0], *_ends(values, width), strict=True)
+    ]
+
+
+def _ends(values: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return values[:, 0] - width, values[:, 0] + width
+
+
+def _statistics_by_span(sums: SpanSums, whole: bool = False) -> np.ndarray:
+    """Statistics (2, n) without each span in turn, (2, 1) of all spans."""
+    left = [one.sum() - (0.0 if whole else one) for one in sums]
+    count, total, square = (np.atleast_1d(one) for one in left)
+    mean = total / count
+    return np.stack([mean, np.sqrt(np.maximum(square / count - mean**2, 0.0))])
+
+
+def _jackknifed(without: np.ndarray) -> np.ndarray:
+    """Variance (2,) of statistics of which (2, n) are known without each span."""
+    n = without.shape[1]
+    return np.asarray((n - 1.0) * without.var(axis=1))

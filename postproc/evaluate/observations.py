@@ -20,9 +20,8 @@ from catenary.postproc.evaluate.statistics import (
     RunStatistics,
     slackens_at_all,
 )
-from catenary.postproc.read.line_of_run import ContactProfile, in_stretch
-from catenary.postproc.read.results import Results
-from catenary.postproc.standards.quantities import KMH
+from catenary.postproc.read.results import ContactProfile, Results, in_stretch
+from catenary.postproc.standards.rule_books import KMH
 from catenary.solver.problem.watched_links import TENSION
 
 # A smaller gradient, a millimetre from mast to mast, is none: erection leaves ten times that [-].

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.read.line_of_run import in_stretch
-from catenary.postproc.read.results import Results
+from catenary.postproc.read.results import Results, in_stretch
 
 # A pantograph moves the wire before it arrives: what a dropper does from here on, three dropper
 # spacings ahead of the head, counts as that pantograph's passage [m].

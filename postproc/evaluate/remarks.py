@@ -8,8 +8,11 @@ import numpy as np
 
 from catenary.postproc.evaluate.error_indicators import Indicators
 from catenary.postproc.evaluate.filters import CUT_OFF
-from catenary.postproc.evaluate.lateral_places import lateral_ranges, sentence
-from catenary.postproc.evaluate.statistics import slackens_at_all
+from catenary.postproc.evaluate.statistics import (
+    lateral_ranges,
+    left_strips_sentence,
+    slackens_at_all,
+)
 from catenary.postproc.evaluate.wording import counted, stiffness_words
 from catenary.postproc.read.results import Results
 from catenary.solver.effects.shipped.stiff_link_effects import STIFF
@@ -50,7 +53,7 @@ def remarks(results: Results) -> list[str]:
     return [
         *_about_excitation(results),
         *results.attributes.get("arrivals", {}).get("warnings", []),
-        *(sentence(p) for p in lateral_ranges(results) if p.left),
+        *(left_strips_sentence(p) for p in lateral_ranges(results) if p.left),
         *_about_incidents(results),
         *_about_contact(results),
         *_about_droppers(results),

@@ -2,23 +2,30 @@
 
 Contact forces are filtered over the whole record first and cut to the evaluation stretch then, so
 that end effects of the filter do not reach the ends of the stretch. Each pantograph is evaluated
-while it is itself within the stretch.
+while it is itself within the stretch. Lateral places of contact wires on the strips are those of
+every step of a run, beside the strips' length.
+
+Derivatives of the statistics by parameters: with the filtered force F of n records and its
+derivative F' by a parameter, which is filtered in the same way as filters are linear,
+
+    mean' = mean(F'),    sigma' = mean((F - mean) (F' - mean')) / sigma,
+
+and an extreme changes as the record in which it stands.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.postproc.channels.places_on_train import in_sentence
+from catenary.postproc.channels.header import in_sentence
 from catenary.postproc.evaluate import filters
-from catenary.postproc.evaluate.lateral_places import LateralRange, lateral_ranges
-from catenary.postproc.read.line_of_run import in_stretch
-from catenary.postproc.read.results import Results
+from catenary.postproc.read.results import Results, in_stretch
 
 SHORTEST_ARC = 5e-3
 HISTOGRAM_BIN, MOST_BINS = 10.0, 1000
@@ -367,3 +374,164 @@ def slack_times(results: Results) -> np.ndarray:
     for _, columns, force in results.written_blocks("dropper_force"):
         times[columns] += interval * np.count_nonzero(force <= 0.0, axis=0)
     return times
+
+
+@dataclass(frozen=True)
+class LateralRange:
+    """One pantograph over every step of a run with lateral motion.
+
+    Attributes
+    ----------
+    name : "leading", "trailing", ...
+    place : farthest place of a contact wire from the middle of a strip, to the left [m]
+    time, x : when that was [s], and where along the track [m]
+    half_length : of the strips [m], NaN if it is not known
+    left_time, left_x : when and where a wire first was beyond the end of a strip, NaN if it never
+        was
+    """
+
+    name: str
+    place: float
+    time: float
+    x: float
+    half_length: float
+    left_time: float = math.nan
+    left_x: float = math.nan
+
+    @property
+    def left(self) -> bool:
+        """Whether a wire has left a strip."""
+        return not math.isnan(self.left_time)
+
+
+def lateral_ranges(results: Results) -> list[LateralRange]:
+    """Ranges of all pantographs, none without lateral motion. Not collective."""
+    if not results.has("lateral_place") or not results.n_rows("time"):
+        return []
+    half_lengths = results.facts_of("strip_half_length")
+    found = []
+    columns = [list(own.values()) for own in results.contact_columns()]
+    for p, (name, own) in enumerate(zip(results.pantograph_names(), columns, strict=True)):
+        farthest, at, left = 0.0, 0, -1
+        half = float(half_lengths[p])
+        for part, places in results.blocks("lateral_place"):
+            mine = np.where(np.isfinite(places[:, own]), places[:, own], 0.0)
+            worst = mine[np.arange(len(mine)), np.abs(mine).argmax(axis=1)]
+            row = int(np.abs(worst).argmax())
+            if abs(worst[row]) > abs(farthest) or part.start == 0:
+                farthest, at = float(worst[row]), part.start + row
+            beyond = np.flatnonzero(np.abs(worst) > half)
+            if left < 0 and beyond.size:
+                left = part.start + int(beyond[0])
+        position = results.column("contact_position", p)
+        when = results.time_at(at), float(position[at])
+        gone = (results.time_at(left), float(position[left])) if left >= 0 else (math.nan, math.nan)
+        found.append(LateralRange(name, farthest, *when, half, *gone))
+    return found
+
+
+def left_strips_sentence(p: LateralRange) -> str:
+    """Sentence on a wire that left a strip, with time and place."""
+    who = "the pantograph" if p.name == "pantograph" else f"the {p.name} pantograph"
+    return (
+        f"At {p.left_time:.4g} s, {p.left_x:.4g} m, a contact wire leaves the strips of {who}, "
+        f"which end {p.half_length:.3g} m beside their middle: it gets {abs(p.place):.3g} m away "
+        "from that. What follows assumes that it stays on them."
+    )
+
+
+def lateral_table(ranges: list[LateralRange]) -> list[dict[str, Any]]:
+    """Plain values for the summary."""
+    return [
+        {
+            "name": p.name,
+            "max_place_mm": 1e3 * p.place,
+            "time_s": p.time,
+            "at_m": p.x,
+            "strip_half_length_mm": 1e3 * p.half_length,
+            "left_strip_s": p.left_time,
+            "left_strip_at_m": p.left_x,
+        }
+        for p in ranges
+    ]
+
+
+# Standard deviations from the mean to statistical extremes.
+_STATISTICAL = 3.0
+
+
+class ForceDerivatives(NamedTuple):
+    """Derivatives (m,) by m parameters of the statistics of a contact force [N], named as in
+    ``PantographStatistics``."""
+
+    mean: np.ndarray
+    std: np.ndarray
+    maximum: np.ndarray
+    minimum: np.ndarray
+    stat_max: np.ndarray
+    stat_min: np.ndarray
+
+
+def force_derivatives(
+    force: np.ndarray,
+    by_force: np.ndarray,
+    within: np.ndarray,
+    dt: float,
+    by_place: np.ndarray | None = None,
+) -> ForceDerivatives:
+    """Derivatives of the statistics of a contact force. Not collective.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n,)
+        Force of all records [N].
+    by_force : ndarray, shape (n, m)
+        Its derivatives by m parameters.
+    within : ndarray, shape (n,), dtype bool
+        Records in the evaluated stretch.
+    dt : float
+        Time between two records [s].
+    by_place : ndarray, shape (n, m), optional
+        Derivatives of the pantograph's position over the train's speed [s], where
+        parameters change either: the stretch stays, so that records are compared at equal
+        places.
+
+    Raises
+    ------
+    InputError
+        If the records are too far apart for the 20 Hz filter.
+    """
+    filtered = filters.low_pass(force, dt)
+    changes = filters.low_pass(by_force, dt)
+    if by_place is not None and by_place.any():
+        changes = changes - _rate_of_change(filtered, dt)[:, None] * by_place
+    filtered, changes = filtered[within], changes[within]
+    mean, std = changes.mean(axis=0), filtered.std()
+    about = filtered - filtered.mean()
+    by_std = about @ (changes - mean) / (filtered.size * std) if std > 0.0 else np.zeros(mean.size)
+    return ForceDerivatives(
+        mean,
+        by_std,
+        changes[int(np.argmax(filtered))],
+        changes[int(np.argmin(filtered))],
+        mean + _STATISTICAL * by_std,
+        mean - _STATISTICAL * by_std,
+    )
+
+
+def largest_derivatives(values: np.ndarray, by_values: np.ndarray) -> np.ndarray:
+    """Derivatives (m,) of the largest of ``values`` (n, k), whose own are ``by_values`` (n, m, k);
+    NaN if there are none."""
+    if not values.size:
+        return np.full(by_values.shape[1], np.nan)
+    record, column = np.unravel_index(int(np.argmax(values)), values.shape)
+    return np.asarray(by_values[record, :, column])
+
+
+def _rate_of_change(values: np.ndarray, dt: float) -> np.ndarray:
+    """Rate of change of records, by differences of the fourth order, of the second at both ends."""
+    slope = np.gradient(values, dt)
+    if values.size > 4:
+        inner = 8.0 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])
+        slope[2:-2] = inner / (12.0 * dt)
+    return np.asarray(slope)

@@ -11,9 +11,17 @@ from catenary.base.errors import InputError
 from catenary.postproc.evaluate.observations import Observation, observe
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.read.results import Results
-from catenary.postproc.standards.book import Conditions, LimitRow, Rule, RuleBook
-from catenary.postproc.standards.library import DEFAULT, book_named, books_of_entries
-from catenary.postproc.standards.quantities import KMH, SYSTEMS
+from catenary.postproc.standards.rule_books import (
+    DEFAULT,
+    KMH,
+    SYSTEMS,
+    Conditions,
+    LimitRow,
+    Rule,
+    RuleBook,
+    book_named,
+    books_of_entries,
+)
 
 _MET = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
 

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 from h5py import h5d, h5ds, h5s
 
-from catenary.postproc.files.hdf5.checked import create_checked, set_attribute
+from catenary.postproc.files.hdf5 import create_checked, set_attribute
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     COLUMNS,

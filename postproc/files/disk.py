@@ -17,10 +17,9 @@ import h5py
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.base.whole_files import appears_whole
+from catenary.base.files import appears_whole
 from catenary.postproc.files.disk_errors import code_of, reason, remedy
-from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
-from catenary.postproc.files.hdf5.self_contained import open_own
+from catenary.postproc.files.hdf5 import FORMAT_BOUNDS, open_own
 
 # Errors of flock on a file system without locks.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)

@@ -5,11 +5,16 @@ stands; room on the disk is claimed one append ahead, so that a full disk costs 
 writes its tables in no order that helps one who reads a file whose writer was killed: a table may
 have got longer, and its rows not be there yet. Hence the committed row counts ``COMPLETE``, which
 are written after the rows.
+
+A run that is to go on beyond its end gets its later head in a copy of the file, which takes its
+place when it is whole (``extend_run``): what breaks leaves the run as it was.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,12 +23,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import h5py
 import numpy as np
 
-from catenary.base.errors import InputError
-from catenary.base.whole_files import new_part
+from catenary.base.errors import InputError, RunBroken
+from catenary.base.files import appears_whole, new_part
 from catenary.postproc.channels.facts import FACTS
-from catenary.postproc.channels.line_record import GZIP, GZIP_LEVEL, LineRecord
+from catenary.postproc.channels.header import GZIP, GZIP_LEVEL, Header, LineRecord
 from catenary.postproc.files import dimensions
-from catenary.postproc.files.committed_rows import cut, rows_of
+from catenary.postproc.files.chunk_shapes import Chunk, chunks_of, room_of
+from catenary.postproc.files.committed_rows import (
+    ForceFilter,
+    cut,
+    extremes_at,
+    rows_of,
+    store_extremes,
+    store_filtered,
+)
 from catenary.postproc.files.disk import (
     MARGIN,
     abandon,
@@ -31,29 +44,29 @@ from catenary.postproc.files.disk import (
     check_in_place,
     check_uncut,
     open_to_write,
+    opened,
     reserve,
     trimmed,
 )
-from catenary.postproc.files.filtered_force import ForceFilter, store_filtered
-from catenary.postproc.files.hdf5.checked import (
+from catenary.postproc.files.disk_errors import reason
+from catenary.postproc.files.hdf5 import (
+    ATTRIBUTE_SUMS,
     FORMAT_BOUNDS,
+    append_rows,
     create_checked,
+    grow,
     put_array,
     put_sealed_arrays,
     seal_arrays,
     seal_attributes,
     set_attribute,
-)
-from catenary.postproc.files.hdf5.chunk_shapes import Chunk, chunks_of, room_of
-from catenary.postproc.files.hdf5.table_rows import (
-    append_rows,
-    grow,
+    text_of,
     write_window,
 )
-from catenary.postproc.files.kept_extremes import extremes_at, store_extremes
 from catenary.postproc.files.run_schema import (
     COMPLETE,
     FORMAT,
+    INTERRUPTED,
     LINE_TIME,
     RUNNING,
     growing_tables,
@@ -62,7 +75,6 @@ from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
 
 if TYPE_CHECKING:
-    from catenary.postproc.channels.header import Header
     from catenary.solver.time_loop.views.observers import Stage
 
 # The state to continue from is kept twice and written in turn: a run that is killed while it
@@ -392,3 +404,64 @@ def _create_growing(
     )
     set_attribute(dataset, "unit", channel.unit)
     set_attribute(dataset, "meaning", channel.meaning)
+
+
+# Steps of the run as it was begun: what is recorded follows from them.
+BEGUN_FOR = "n_steps_begun_for"
+# Attributes that a later end leaves: who wrote the rows that are there, how, and who chose effects.
+_KEPT = ("versions", "petsc_options", "effects_on", "effects_off")
+# Tables that it changes beside attributes and facts.
+CHANGED = ("line/evaluation_range",)
+
+
+def extend_run(path: Path, header: Header, n_steps: int) -> None:
+    """Turn a result file into that of a run of ``n_steps`` interrupted where it has ended.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the result file.
+    header : Header
+        Header of the run with its later end.
+    n_steps : int
+        Number of steps up to the later end.
+
+    Raises
+    ------
+    RunBroken
+        If the file cannot be written; it is as it was.
+    """
+    try:
+        with appears_whole(path) as made_as:
+            shutil.copyfile(path, made_as, follow_symlinks=False)
+            with opened(made_as, "r+") as file:
+                _change(file, header, n_steps)
+    except (OSError, RuntimeError) as error:
+        raise RunBroken(
+            f"{path} cannot be given a later end ({reason(error)}); it is as it was"
+        ) from error
+
+
+def _change(file: h5py.File, header: Header, n_steps: int) -> None:
+    known = {
+        name: as_attribute(value)
+        for name, value in {**header.attributes, "n_steps_planned": n_steps}.items()
+        if name not in _KEPT
+    }
+    reserve(file, MARGIN + sum(len(str(value).encode()) for value in known.values()))
+    # A file whose checksums were taken away gets none.
+    has_sums = ATTRIBUTE_SUMS in file.attrs
+    sealed = list(json.loads(text_of(file.attrs[ATTRIBUTE_SUMS]))) if has_sums else []
+    if BEGUN_FOR not in file.attrs:
+        set_attribute(file, BEGUN_FOR, file.attrs["n_steps_planned"])
+        sealed.append(BEGUN_FOR)
+    for name, value in known.items():
+        set_attribute(file, name, value)
+    if has_sums:
+        seal_attributes(file, sealed)
+    set_attribute(file, "outcome", INTERRUPTED)
+    for name in CHANGED:
+        file[name][...] = header.datasets[name]
+    for name, value in header.facts.items():
+        put_array(file["facts"], name, value)
+    seal_arrays(file["facts"], header.facts)

@@ -17,9 +17,14 @@ from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.facts import WIRE as CONTACT_WIRE
-from catenary.postproc.channels.line_record import LineRecord, from_table
-from catenary.postproc.standards.library import DEFAULT, books_of_entries, editions_of
-from catenary.postproc.standards.quantities import LIMIT_KEYS, SYSTEMS
+from catenary.postproc.channels.header import LineRecord, from_table
+from catenary.postproc.standards.rule_books import (
+    DEFAULT,
+    LIMIT_KEYS,
+    SYSTEMS,
+    books_of_entries,
+    editions_of,
+)
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
 from catenary.solver.waves.excitation import excitation_of_facts

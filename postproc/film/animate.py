@@ -15,14 +15,20 @@ from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
 from catenary.postproc.files.own_files import GIF, MP4
 from catenary.postproc.film import drawing
-from catenary.postproc.film.chart import ForceChart, RingingChart
-from catenary.postproc.film.film_data import FilmData, film_data
+from catenary.postproc.film.drawing import ForceChart, RingingChart
+from catenary.postproc.film.film_data import FilmData, Snapshots, film_data
 from catenary.postproc.film.options import FilmOptions
-from catenary.postproc.film.projection import Picture, Projection
-from catenary.postproc.film.scenery import COLOURS, DROPPER_FORCES, MOTIONS, SLACK, Scenery
-from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.read.records import Records
+from catenary.postproc.film.scenery import (
+    COLOURS,
+    DROPPER_FORCES,
+    MOTIONS,
+    SLACK,
+    Picture,
+    Projection,
+    Scenery,
+)
 from catenary.postproc.read.results import Results
+from catenary.postproc.read.validation import Records
 from catenary.solver.waves.excitation import Blow
 
 # Length of line in a picture beside one pantograph [m].

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from catenary.base.whole_files import appears_whole
+from catenary.base.files import appears_whole
 from catenary.postproc.files.disk import unwritten
 
 # A GIF has pictures of this width [px], and so many a second at most.

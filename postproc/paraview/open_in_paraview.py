@@ -1,26 +1,43 @@
-"""Writes the script that opens a run in ParaView, and what it shows beside the line."""
+"""Opens a run in ParaView: writes a script, what it shows beside the line, and a state.
+
+What moves or stands beside the line (pantographs, contact forces, train, track) goes into XDMF
+files of one grid a time, with a common HDF5 file. Points are places at rest; a field
+``displacement`` moves them, as in ``fields.xdmf``, so that one factor draws all motions larger. The
+state opens a run without Python: ParaView's own program makes it from the script.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Sequence
 from importlib import resources
 from pathlib import Path
 
+import h5py
 import numpy as np
 from matplotlib.colors import to_rgb
 
 from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
 from catenary.postproc.files.disk import unwritten, write_whole
-from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.film_data import Snapshots, film_data
 from catenary.postproc.film.options import View
-from catenary.postproc.film.projection import Picture, room_above
-from catenary.postproc.film.scenery import COLOURS, LOOKS, MOTIONS, THICK, Scenery
-from catenary.postproc.film.snapshots import Snapshots
-from catenary.postproc.paraview import beside_line
-from catenary.postproc.read.records import Records
+from catenary.postproc.film.scenery import (
+    COLOURS,
+    FORCES,
+    LOOKS,
+    MOTIONS,
+    THICK,
+    Picture,
+    Scenery,
+    room_above,
+)
 from catenary.postproc.read.results import Results
+from catenary.postproc.read.validation import Records
 
 SCRIPT, FOLDER = "view.py", "paraview"
 _TEMPLATE = "view.py.template"
@@ -67,7 +84,7 @@ def write_script(
                 raise InputError(f"{target} is a link, through which nothing is written; remove it")
             try:
                 target.mkdir(exist_ok=True)
-                files = beside_line.write(scenery, snapshots, target)
+                files = write_beside_line(scenery, snapshots, target)
                 settings = _settings(target, scenery, snapshots, motion, look or scenery.best_view)
                 write_whole(
                     target / SCRIPT,
@@ -129,3 +146,180 @@ def _settings(
         "speed": data.speed,
         "times": [float(times[0]), float(times[-1])],
     }  # fmt: skip
+
+
+_NUMBERS = "scenery.h5"
+_CELLS = {1: "Polyvertex", 2: "Polyline", 4: "Quadrilateral"}
+
+
+def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
+    """Write the parts beside the line at the times of the snapshots. Not collective.
+
+    Parameters
+    ----------
+    scenery : Scenery
+        Scenery of the run.
+    snapshots : Snapshots
+        Snapshots of the line.
+    folder : Path
+        Existing folder to which the files go.
+
+    Returns
+    -------
+    The XDMF file of each part by its name.
+
+    Raises
+    ------
+    OSError
+        If they cannot be written.
+    """
+    data, grids = scenery.data, {name: list[str]() for name in scenery.parts}
+    # In memory: HDF5 crashes the interpreter at its end where a disk has refused a write.
+    with h5py.File(_NUMBERS, "w", driver="core", backing_store=False) as file:
+        still = {
+            name: (
+                _topology(_put(file, f"{name}/cells", part.cells.astype(np.int32))),
+                [_put(file, f"{name}/{own}", values.astype(np.int32))
+                 for own, values in part.fields.items()],
+            )
+            for name, part in scenery.parts.items()
+        }  # fmt: skip
+        for k, time in enumerate(snapshots.times.tolist()):
+            for name, (rest, moved) in scenery.beside(time, snapshots.frame(time)).items():
+                moves, (topology, of_cells) = scenery.parts[name].moves, still[name]
+                if k and not moves:
+                    continue
+                at = f"{name}/{k:06d}"
+                fields = [_put(file, f"{at}/displacement", moved.astype("<f4"))]
+                if name == FORCES:
+                    force = np.zeros((data.n_pantographs, 3), dtype="<f4")
+                    force[:, 2] = data.force[data.row_at(time)]
+                    fields.append(_put(file, f"{at}/force", force))
+                points = _put(file, f"{at}/points", rest)
+                grids[name].append(
+                    _grid(topology, points, fields, of_cells, time if moves else None)
+                )
+        file.flush()
+        write_whole(folder / _NUMBERS, bytes(file.id.get_file_image()))
+    files = {name: folder / f"{name}.xdmf" for name in grids}
+    for name, path in files.items():
+        write_whole(path, _text(name, grids[name]))
+    return files
+
+
+# ---- XDMF --------------------------------------------------------------------------------------
+
+
+def _put(file: h5py.File, path: str, values: np.ndarray) -> h5py.Dataset:
+    return file.create_dataset(path, data=values)
+
+
+def _item(table: h5py.Dataset) -> str:
+    number = "Int" if table.dtype.kind == "i" else "Float"
+    return (
+        f'<DataItem Dimensions="{" ".join(map(str, table.shape))}" NumberType="{number}" '
+        f'Precision="{table.dtype.itemsize}" Format="HDF">{_NUMBERS}:{table.name}</DataItem>'
+    )
+
+
+def _topology(cells: h5py.Dataset) -> str:
+    n, each = cells.shape
+    return (
+        f'<Topology TopologyType="{_CELLS[each]}" NodesPerElement="{each}" '
+        f'NumberOfElements="{n}">{_item(cells)}</Topology>'
+    )
+
+
+def _grid(
+    topology: str,
+    points: h5py.Dataset,
+    of_nodes: Iterable[h5py.Dataset] = (),
+    of_cells: Iterable[h5py.Dataset] = (),
+    time: float | None = None,
+) -> str:
+    """Text of a grid, with fields named as their tables are."""
+    at = "" if time is None else f'<Time Value="{time!r}"/>'
+    parts = [at, topology, f'<Geometry GeometryType="XYZ">{_item(points)}</Geometry>']
+    for center, tables in (("Node", of_nodes), ("Cell", of_cells)):
+        for table in tables:
+            name, kind = Path(table.name).name, "Scalar" if table.ndim == 1 else "Vector"
+            parts.append(
+                f'<Attribute Name="{name}" AttributeType="{kind}" Center="{center}">'
+                f"{_item(table)}</Attribute>"
+            )
+    return "\n".join(parts)
+
+
+def _text(name: str, grids: list[str]) -> str:
+    """A file of grids, of which several are one after another in time."""
+    whole = [f'<Grid Name="{name}" GridType="Uniform">{grid}\n</Grid>' for grid in grids]
+    if len(grids) > 1:
+        begin = f'<Grid Name="{name}" GridType="Collection" CollectionType="Temporal">'
+        whole = [begin, *whole, "</Grid>"]
+    head = '<?xml version="1.0" encoding="UTF-8"?>\n<Xdmf Version="3.0">\n<Domain>'
+    return "\n".join([head, *whole, "</Domain>\n</Xdmf>\n"])
+
+
+STATE = "view.pvsm"
+PROGRAM, _SCREEN = "pvpython", "xvfb-run"
+# Longest that ParaView may take [s].
+_PATIENCE = 300.0
+# Without -noreset a screen starts anew whenever nobody is connected to it, and refuses whoever
+# comes meanwhile: ParaView connects, leaves and connects again.
+SCREEN_OF_ITS_OWN = "-screen 0 1600x900x24 -noreset"
+# Two that begin at one time may take one screen, which the first to end takes from the other.
+_ATTEMPTS, _LOST = 3, "X server connection"
+
+
+def write_state(script: Path) -> tuple[Path | None, str]:
+    """Write ``view.pvsm`` beside the script that opens a run. Not collective.
+
+    Returns
+    -------
+    The state, and an empty text; or None, and one sentence that says why there is none.
+    """
+    command, why = _command()
+    if not command:
+        return None, why
+    state = script.with_name(STATE)
+    part = script.with_name(f".{script.stem}.{os.getpid()}{state.suffix}")
+    try:
+        part.unlink(missing_ok=True)  # a link that was put there would be written through
+        for _ in range(_ATTEMPTS):
+            done = subprocess.run(
+                [*command, str(script), "--state", str(part)],
+                capture_output=True,
+                text=True,
+                timeout=_PATIENCE,
+                check=False,
+            )
+            if done.returncode == 0 and part.is_file():
+                os.replace(part, state)
+                return state, ""
+            if _LOST not in done.stderr:
+                break
+        lines = [line for line in done.stderr.splitlines() if line.strip()]
+        # The program that makes the screen complains last, about what it cannot clean up.
+        own = [line for line in lines if not line.startswith(_SCREEN)]
+        why = f"{PROGRAM} failed: {(own or lines or ['it wrote nothing'])[-1]}"
+    except (OSError, subprocess.TimeoutExpired) as error:
+        why = f"{PROGRAM} failed: {error}"
+    finally:
+        part.unlink(missing_ok=True)
+    return None, f"no state is written, the script does the same ({why})"
+
+
+def _command() -> tuple[Sequence[str], str]:
+    """Command that starts ParaView's Python here, or the reason why none can."""
+    if shutil.which(PROGRAM) is None:
+        return (), f"no state is written: {PROGRAM} is not on this machine"
+    if not sys.platform.startswith("linux"):
+        return (PROGRAM,), ""
+    # Debian's draws on a screen only. One of its own is there whatever DISPLAY says.
+    if shutil.which(_SCREEN) is not None:
+        # Two that begin at one time look for a free number from different ones on.
+        number = str(100 + os.getpid() % 5000)
+        return (_SCREEN, "-a", "-n", number, "-s", SCREEN_OF_ITS_OWN, PROGRAM), ""
+    if os.environ.get("DISPLAY"):
+        return (PROGRAM,), ""
+    return (), f"no state is written: {PROGRAM} needs a screen, or {_SCREEN}"

@@ -14,10 +14,10 @@ import sys
 from pathlib import Path
 
 from catenary.base.errors import InputError
-from catenary.base.paths import is_file, is_folder
+from catenary.base.files import is_file, is_folder
 from catenary.postproc.files.own_files import RUN_FILE
-from catenary.postproc.read.records import Records
-from catenary.postproc.read.validated_file import ValidatedFile
+from catenary.postproc.read.result_tables import ValidatedFile
+from catenary.postproc.read.validation import Records
 
 # Time limit of reading a file: so long, and a second for each part of this size [s], [B].
 LIMIT, PER_SECOND = 30.0, 10e6
@@ -27,7 +27,7 @@ _OF_LAUNCHERS = ("OMPI_", "PMIX_", "PMI_")
 _WALK = """
 import sys
 from pathlib import Path
-from catenary.postproc.files.hdf5.self_contained import open_own
+from catenary.postproc.files.hdf5 import open_own
 from catenary.base.errors import InputError
 try:
     file = open_own(Path(sys.argv[1]), locking=False)

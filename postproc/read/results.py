@@ -1,29 +1,262 @@
-"""Reads a result file, finished or not. Everything after the run goes through this reader."""
+"""Results of a run, finished or not. Everything after the run goes through this reader.
+
+`LineOfRun` has what is written of the line once: its shape, and its values at rest. `TrainOfRun`
+adds the pantographs in running order, their strips, and their columns; `Results` adds facts,
+channels, extremes, energies, and the state to continue from.
+"""
 
 from __future__ import annotations
 
+import itertools
 import logging
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.base.paths import is_file, is_folder, is_there
+from catenary.base.files import is_file, is_folder, is_there
+from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.line_record import LineRecord
-from catenary.postproc.files.filtered_force import filtered_in
-from catenary.postproc.files.hdf5 import table_rows
+from catenary.postproc.channels.header import LineRecord, places_on_train
+from catenary.postproc.files import hdf5
+from catenary.postproc.files.committed_rows import filtered_in
 from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
-from catenary.postproc.read.line_of_run import ResultTables
-from catenary.postproc.read.records import Records
-from catenary.postproc.read.train_of_run import TrainOfRun
-from catenary.postproc.read.validated_file import ValidatedFile
+from catenary.postproc.read.registration import Registration
+from catenary.postproc.read.result_tables import MarchedFile, ValidatedFile
+from catenary.postproc.read.validation import Records
 from catenary.solver.time_loop.views import channels
+
+# Places along the line come from sums of span lengths, which round by far less [m].
+_ROUNDING = 1e-6
+
+
+def in_stretch(x: np.ndarray, start: float, end: float) -> np.ndarray:
+    """Whether places ``x`` (n,) of the line are in a stretch, its ends included, (n,) bool."""
+    return np.asarray((x >= start - _ROUNDING) & (x <= end + _ROUNDING))
+
+
+class ContactProfile(NamedTuple):
+    """A contact wire at rest.
+
+    breaks : places among its nodes at which further pieces of it begin
+    x, height : of its nodes along the track, and above the rail [m]
+    y : of its nodes to the left [m]; None where no wire moves sideways
+    """
+
+    breaks: np.ndarray
+    x: np.ndarray
+    height: np.ndarray
+    y: np.ndarray | None = None
+
+    def pieces(self) -> list[slice]:
+        """Its nodes, piece by piece."""
+        ends = [0, *self.breaks.tolist(), self.x.size]
+        return [slice(*pair) for pair in itertools.pairwise(ends) if pair[0] < pair[1]]
+
+    def height_at(self, x: np.ndarray) -> np.ndarray:
+        """Height of its lowest piece at places ``x`` along the track [m], infinite where it has
+        none."""
+        height = np.full(np.shape(x), np.inf)
+        for own in self.pieces():
+            piece = np.interp(x, self.x[own], self.height[own], np.inf, np.inf)
+            height = np.minimum(height, piece)
+        return height
+
+    def drawn(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places along the track and values at the nodes, with a gap between pieces."""
+        x = np.insert(self.x, self.breaks, self.x[self.breaks])
+        return x, np.insert(values, self.breaks, np.nan)
+
+
+# The tables of a result file, which is open and valid, or of a march that wrote none.
+ResultTables = ValidatedFile | MarchedFile
+
+
+class LineOfRun:
+    """Constants of a result file that is open. Not collective.
+
+    Parameters
+    ----------
+    file : ResultTables
+    """
+
+    def __init__(self, file: ResultTables) -> None:
+        self._file = file
+
+    def line(self, name: str) -> np.ndarray:
+        """A dataset of ``/line``, for instance ``support_x``."""
+        return np.asarray(self._file[f"line/{name}"][...])
+
+    def wires(self) -> dict[str, np.ndarray]:
+        """Node numbers of each wire in order of x."""
+        return {name: np.asarray(nodes[...]) for name, nodes in self._file["line/wires"].items()}
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """The role of each wire by its name, in the order of the line."""
+        return {name: Role(role) for name, role in self._file.attrs["wires"].items()}
+
+    def wires_of(self, role: Role) -> list[str]:
+        """Names of the wires of a role, in the order of the line."""
+        return [name for name, own in self.roles.items() if own is role]
+
+    def contact_profiles(self) -> dict[str, ContactProfile]:
+        """Each contact wire at rest by its name."""
+        names, wires = self.wires_of(Role.CONTACT), self.wires()
+        ends = np.cumsum([wires[name].size for name in names])[:-1]
+        columns = [
+            np.split(self.static(f"contact_{own}"), ends)
+            for own in ("x", "height", "y")
+            if own != "y" or self.has_static("contact_y")
+        ]
+        return {
+            name: ContactProfile(self._breaks(name), *own)
+            for name, *own in zip(names, *columns, strict=True)
+        }
+
+    def elements(self) -> dict[str, np.ndarray]:
+        """Nodes of the elements of each wire, (n, 2) each, in order of x."""
+        return {name: elements_of(own, self._breaks(name)) for name, own in self.wires().items()}
+
+    def _breaks(self, wire: str) -> np.ndarray:
+        """Places among the nodes of a wire at which further pieces of it begin."""
+        path = f"line/breaks/{wire}"
+        return np.asarray(self._file[path][...] if path in self._file else [], dtype=np.int64)
+
+    def static(self, name: str) -> np.ndarray:
+        """A dataset of ``/static``, for instance ``dropper_length``."""
+        return np.asarray(self._file[f"static/{name}"][...])
+
+    def has_static(self, name: str) -> bool:
+        """Whether ``/static`` has a dataset, which lines may be without."""
+        return f"static/{name}" in self._file
+
+    def registration(self) -> Registration | None:
+        """Steady arms at rest; None of straight wires."""
+        if not self.has_static("arm_force"):
+            return None
+        names = ("arm_stagger", "arm_force", "arm_tension")
+        table = {name: self.static(name) for name in names}
+        known = {"arm_x": self.line("arm_x"), "arm_wire": self.line("arm_wire")}
+        return Registration.of({**table, **known}, list(self.roles))
+
+    def arm_wires(self) -> list[str]:
+        """Name of the wire that each steady arm holds."""
+        names = list(self.roles)
+        return [names[number] for number in self.line("arm_wire").tolist()]
+
+    def dropper_wires(self) -> np.ndarray:
+        """Numbers of the upper and the lower wire of each dropper, (n_droppers, 2)."""
+        of_node = np.zeros(self.line("node_points").shape[0], dtype=np.int64)
+        wires = self.wires()
+        for number, name in enumerate(self.roles):
+            of_node[wires[name]] = number
+        return of_node[self.line("droppers")].reshape(-1, 2)
+
+    @cached_property
+    def evaluation(self) -> tuple[float, float]:
+        """From and to of the stretch whose statistics are judged [m]."""
+        start, end = self.line("evaluation_range")
+        return float(start), float(end)
+
+    @cached_property
+    def reference_span(self) -> int:
+        """The span that is shown for all, counted from 0: the one in the middle of the evaluation
+        stretch, or the nearest to it outside of overlaps."""
+        masts = self.line("support_x")
+        middle = 0.5 * sum(self.evaluation)
+        span = int(np.clip(np.searchsorted(masts, middle, side="right") - 1, 0, masts.size - 2))
+        middles = 0.5 * (masts[:-1] + masts[1:])
+        heights = [wire.height_at(middles) for wire in self.contact_profiles().values()]
+        wires = np.isfinite(heights).sum(axis=0)
+        usual = np.flatnonzero(wires == np.median(wires))
+        if wires[span] <= np.median(wires) or not usual.size:
+            return span
+        return int(usual[np.argmin(np.abs(middles[usual] - middle))])
+
+    @cached_property
+    def span_at_rest(self) -> int:
+        """The span along which the elasticity is known, counted from 0: one in the middle of the
+        line outside overlaps."""
+        at, masts = self.static("elasticity_x"), self.line("support_x")
+        if not at.size:
+            return self.reference_span
+        return int(np.searchsorted(masts, 0.5 * (at[0] + at[-1]), side="right")) - 1
+
+
+class TrainOfRun(LineOfRun):
+    """Pantographs, strips and wires over them, in a result file that is open. Not collective."""
+
+    def facts_of(self, name: str) -> np.ndarray:
+        """A fact of each pantograph, (n_pantographs,), NaN as of ``Results.fact``."""
+        return np.broadcast_to(self._file.facts[name], self.n_pantographs)
+
+    @property
+    def n_pantographs(self) -> int:
+        """Number of pantographs."""
+        return self._file.sizes["pantograph"]
+
+    def n_strips(self) -> list[int]:
+        """Number of strips of each pantograph, by their order."""
+        recorded: list[int] = self._file.attrs["n_strips"]
+        return recorded or [1] * self.n_pantographs
+
+    @property
+    def several_strips(self) -> bool:
+        """Whether a pantograph has more than one strip."""
+        return max(self.n_strips(), default=1) > 1
+
+    def strip_columns(self) -> list[range]:
+        """Columns of ``strip_force`` of each pantograph."""
+        ends = np.cumsum([0, *self.n_strips()]).tolist()
+        return [range(*pair) for pair in itertools.pairwise(ends)]
+
+    def wire_columns(self) -> list[dict[str, int]]:
+        """Column of ``contact_wire_force`` by the name of a contact wire, of each pantograph."""
+        names = self.wires_of(Role.CONTACT)
+        numbers = itertools.count()
+        return [{name: next(numbers) for name in names} for _ in range(self.n_pantographs)]
+
+    def contact_columns(self) -> list[dict[str, int]]:
+        """Column of ``lateral_place`` by the name of a contact, of each pantograph: "strip 1
+        contact_wire"; the strip is left out where there is one strip, the wire where one wire."""
+        wires, found, numbers = self.wires_of(Role.CONTACT), [], itertools.count()
+        for strips in self.strip_columns():
+            words = [
+                [*([f"strip {n + 1}"] if len(strips) > 1 else ()), *([w] if len(wires) > 1 else ())]
+                for n in range(len(strips))
+                for w in wires
+            ]
+            found.append({" ".join(own): next(numbers) for own in words})
+        return found
+
+    def pantograph_words(self) -> list[dict[str, Any]]:
+        """Words about each pantograph, by their order: ``kind``, ``model``, ``description``; empty
+        tables in files without."""
+        recorded: list[dict[str, Any]] = self._file.attrs.get("pantographs", [])
+        return recorded or [{} for _ in range(self.n_pantographs)]
+
+    def pantograph_names(self) -> list[str]:
+        """Names of the pantographs, by their order on the train."""
+        n = self.n_pantographs
+        if n == 1:
+            return ["pantograph"]
+        first = self.first_position if self._file.records.rows[0] else -np.arange(n, dtype=float)
+        names = [""] * n
+        for name, index in zip(places_on_train(n), np.argsort(-first, kind="stable"), strict=True):
+            names[index] = name
+        return names
+
+    @property
+    def first_position(self) -> np.ndarray:
+        """Places of the pantographs in the first record, (n_pantographs,) [m]."""
+        return np.asarray(self._file["channels/contact_position"][0])
+
 
 logger = logging.getLogger("catenary.results")
 
@@ -212,14 +445,14 @@ class Results(TrainOfRun):
         if table is not None and place.size:
             valid = self._valid(name, part)
             n = valid.stop - valid.start
-            values[:n] = table_rows.column(table, valid, int(place[0]))
+            values[:n] = hdf5.column(table, valid, int(place[0]))
         return values
 
     def blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray]]:
         """All rows of a channel in order, by blocks: which rows, and their values as ``rows``."""
         table = self._table(name)
         step = table.chunks[0] if table is not None and table.chunks else 1
-        for part in table_rows.row_blocks(self.n_rows(name), self._n_places(name), step):
+        for part in hdf5.row_blocks(self.n_rows(name), self._n_places(name), step):
             yield part, self.rows(name, part)
 
     def written_blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
@@ -233,10 +466,10 @@ class Results(TrainOfRun):
             return
         numbers = self.recorded_columns(name)
         valid, step = self._valid(name, slice(0, self.n_rows(name))), (table.chunks or (1,))[0]
-        for first in range(0, numbers.size, table_rows.COLUMNS_AT_ONCE):
-            columns = slice(first, min(first + table_rows.COLUMNS_AT_ONCE, numbers.size))
-            for part in table_rows.row_blocks(valid.stop, columns.stop - first, step):
-                if not table_rows.unwritten(table, part, columns):
+        for first in range(0, numbers.size, hdf5.COLUMNS_AT_ONCE):
+            columns = slice(first, min(first + hdf5.COLUMNS_AT_ONCE, numbers.size))
+            for part in hdf5.row_blocks(valid.stop, columns.stop - first, step):
+                if not hdf5.unwritten(table, part, columns):
                     yield part, numbers[columns], np.asarray(table[part, columns])
 
     def recorded_columns(self, name: str) -> np.ndarray:
@@ -262,7 +495,7 @@ class Results(TrainOfRun):
         if table is None or (of_line and not self.line_record.whole):
             return np.full((2, self._n_places(name)), np.nan)
         valid = self._valid(name, slice(0, self.n_rows(name)))
-        return table_rows.extremes(table, valid.stop)
+        return hdf5.extremes(table, valid.stop)
 
     def has(self, name: str) -> bool:
         """Whether a channel was recorded, and can be read."""

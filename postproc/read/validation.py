@@ -1,6 +1,7 @@
-"""Validates attributes and tables of a file against their declarations; says what is wrong.
+"""Finds out what of a file is valid: attributes, tables that are written once, and records.
 
-Faults are clauses that follow the name of the file. Not collective.
+Attributes and tables are compared with their declarations; records are read once, by blocks, up to
+the first that is damaged. Faults are clauses that follow the name of the file. Not collective.
 """
 
 from __future__ import annotations
@@ -8,14 +9,35 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Collection
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from catenary.postproc.files.hdf5.checked import ATTRIBUTE_SUMS, HDF5_ERRORS, broken_seals, text_of
-from catenary.postproc.files.run_schema import JSON, SIZES, Table
+from catenary.postproc.channels.header import LineRecord
+from catenary.postproc.files.committed_rows import committed_rows
+from catenary.postproc.files.hdf5 import (
+    ATTRIBUTE_SUMS,
+    COLUMNS_AT_ONCE,
+    HDF5_ERRORS,
+    broken_seals,
+    row_blocks,
+    text_of,
+    unwritten,
+)
+from catenary.postproc.files.run_schema import (
+    ALL_COLUMNS,
+    CLOCKS,
+    COLUMNS,
+    JSON,
+    RUNNING,
+    SIZES,
+    Table,
+    growing_tables,
+    largest,
+)
+from catenary.solver.time_loop.views.channels import RUN, Channel
 
 # Faults of a file that one sentence names.
 _MOST_NAMED = 3
@@ -166,3 +188,201 @@ def listed(faults: Collection[str]) -> str:
     """Faults as one clause; the first few are named, the others counted."""
     shown, more = list(faults)[:_MOST_NAMED], len(faults) - _MOST_NAMED
     return "; ".join(shown) + (f"; and {more} more faults" if more > 0 else "")
+
+
+# A time may be this share of a step off its place.
+_OFF = 1e-3
+
+
+class Records(NamedTuple):
+    """Valid records of a file.
+
+    Attributes
+    ----------
+    rows : of the steps, the energies and the line's channels
+    damaged : path of a damaged table -> its rows before the damage; later ones read as NaN
+    faults : the faults, as clauses
+    last : time of the last valid step [s], NaN without one
+    """
+
+    rows: list[int]
+    damaged: dict[str, int]
+    faults: list[str]
+    last: float
+
+
+def table_faults(
+    file: h5py.File, record: LineRecord, sizes: dict[str, int], most: int
+) -> dict[str, str]:
+    """Faults of growing tables by path: missing, of the wrong type or of the wrong width.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Open result file.
+    record : LineRecord
+        Which of the line's channels are recorded.
+    sizes : dict
+        Sizes of dimensions by name; those of the columns are added.
+    most : int
+        Number of rows that the run plans.
+    """
+    faults: dict[str, str] = {}
+    steps, energies, line = growing_tables(record)
+    for tables in (steps, energies if is_there(file, "energy") else {}, line):
+        for path, channel in tables.items():
+            if tables is line or path == "time" or channel.essential or is_there(file, path):
+                fault = _shape_fault(file, path, channel, sizes, most)
+                faults |= {path: fault} if fault else {}
+    return faults
+
+
+def _shape_fault(
+    file: h5py.File, path: str, channel: Channel, sizes: dict[str, int], most: int
+) -> str:
+    try:
+        table = file[path]
+        shape, kind = table.shape, table.dtype.kind
+    except HDF5_ERRORS:
+        return "is missing or cannot be read"
+    if kind != "f":
+        return "does not hold numbers"
+    if len(shape) != (1 if channel.per == RUN else 2):
+        return f"has {len(shape)} dimensions"
+    if shape[0] > most:
+        return f"has {shape[0]} rows, of {most} that the run plans"
+    if channel.per == RUN:
+        return ""
+    # Without a list of the columns that are recorded all of them are.
+    all_of = sizes.get(ALL_COLUMNS.get(channel.per, ""), shape[1])
+    wanted = sizes.setdefault(COLUMNS[channel.per], all_of)
+    return "" if shape[1] == wanted else f"has {shape[1]} columns in place of {wanted}"
+
+
+def scan(
+    file: h5py.File,
+    about: dict[str, Any],
+    record: LineRecord,
+    dt: float,
+    faults: dict[str, str],
+    complete: tuple[list[int], str] | None = None,
+) -> Records:
+    """Read all records once, by blocks, and find the valid ones.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Open result file.
+    about : dict
+        Valid root attributes.
+    record : LineRecord
+        Which of the line's channels are recorded.
+    dt : float
+        Time between two records [s].
+    faults : dict
+        Faults from ``table_faults``.
+    complete : tuple, optional
+        Counts that ``committed_rows`` found earlier, None to find them now.
+    """
+    n_complete, fault = committed_rows(file) if complete is None else complete
+    clauses = [f"{path} {clause}" for path, clause in faults.items()] + ([fault] if fault else [])
+    damaged = dict.fromkeys(faults, 0)
+    rows = [0, 0, 0]
+    for number, tables in enumerate(growing_tables(record)):
+        usable = {p: c for p, c in tables.items() if p not in faults and is_there(file, p)}
+        # All of the energies are used, or none.
+        if CLOCKS[number] not in usable or (number == 1 and faults.keys() & tables.keys()):
+            continue
+        lengths = {path: file[path].shape[0] for path in usable}
+        short = min(lengths, key=lambda path: lengths[path])
+        n = min(n_complete[number], lengths[short])
+        if n < n_complete[number]:
+            clauses.append(f"{short} ends after {n} of {n_complete[number]} records")
+        parted = {}
+        for path, channel in usable.items():
+            may_be_nan = channel.may_be_nan or (number == 2 and record.window is not None)
+            valid = valid_rows(file[path], n, largest(channel.unit), may_be_nan)
+            if path == CLOCKS[number]:
+                valid = min(valid, _in_order(file[path], valid, dt if number == 0 else None))
+            if valid < n and (channel.essential or path == CLOCKS[number]):
+                clauses.append(f"{path} is damaged from record {valid} on")
+                n = valid
+            elif valid < n:
+                parted[path] = valid
+        parted = {path: valid for path, valid in parted.items() if valid < n}
+        words = "{} is damaged from record {} on, and left out from there"
+        clauses += [words.format(path, valid) for path, valid in parted.items()]
+        damaged |= parted
+        rows[number] = n
+    clauses += _missing_end(about, rows[0])
+    last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")
+    return Records(rows, damaged, clauses, last)
+
+
+def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) -> int:
+    """Number of the first ``n_rows`` rows of a table before one that cannot be read, or holds
+    infinity, more than ``most``, or NaN unless it ``may_be_nan``."""
+    n_columns = int(np.prod(table.shape[1:]))
+    chunk, start = table.chunks[0] if table.chunks else 1, 0
+    try:
+        for part in row_blocks(n_rows, min(n_columns, COLUMNS_AT_ONCE), chunk):
+            start = part.start
+            bad = _invalid(table, part, n_columns, most, may_be_nan)
+            if bad.any():
+                return start + int(bad.argmax())
+        return n_rows
+    except HDF5_ERRORS:
+        pass  # somewhere in this block
+    for first in range(start, n_rows, chunk):
+        part = slice(first, min(first + chunk, n_rows))
+        try:
+            bad = _invalid(table, part, n_columns, most, may_be_nan)
+        except HDF5_ERRORS:
+            return first
+        if bad.any():
+            return first + int(bad.argmax())
+    return n_rows
+
+
+def _invalid(
+    table: h5py.Dataset, part: slice, n_columns: int, most: float, may_be_nan: bool
+) -> np.ndarray:
+    """Mask of rows with impossible values, (rows,) bool."""
+    bad = np.zeros(part.stop - part.start, dtype=bool)
+    for first in range(0, n_columns, COLUMNS_AT_ONCE):
+        columns = (slice(first, first + COLUMNS_AT_ONCE),) if table.ndim == 2 else ()
+        if may_be_nan and columns and unwritten(table, part, columns[0]):
+            continue
+        values = np.asarray(table[(part, *columns)]).reshape(bad.size, -1)
+        # Not true of NaN. As good as all blocks are valid, and this makes no arrays.
+        if values.size and -most <= values.min() and values.max() <= most:
+            continue
+        with np.errstate(invalid="ignore"):
+            valid = np.abs(values) <= most
+        bad |= ~(valid | np.isnan(values) if may_be_nan else valid).all(axis=1)
+    return bad
+
+
+def _in_order(table: h5py.Dataset, n: int, dt: float | None) -> int:
+    """Times before the first that is not after the one before, or not a number of steps of
+    ``dt`` [s] after the first."""
+    first, before = float(table[0]) if n else 0.0, -np.inf
+    for part in row_blocks(n, 1):
+        time = np.asarray(table[part])
+        wrong = np.diff(time, prepend=before) <= 0.0
+        if dt is not None:
+            wrong |= np.abs(time - first - dt * np.arange(part.start, part.stop)) > _OFF * dt
+        if wrong.any():
+            return part.start + int(wrong.argmax())
+        before = time[-1]
+    return n
+
+
+def _missing_end(about: dict[str, Any], n: int) -> list[str]:
+    """Fault of a file with fewer steps than its head states; none otherwise."""
+    wanted = about.get("n_steps")
+    if wanted is None or about["outcome"] == RUNNING or n == wanted + 1:
+        return []
+    if not n and not wanted:  # it broke before the first step
+        return []
+    return [f"{n} of {wanted + 1} records are valid"]

@@ -21,21 +21,23 @@ from catenary.postproc.files.own_files import (
     REPORT_FILES,
     remove_stale,
 )
-from catenary.postproc.read.records import Records
 from catenary.postproc.read.results import Results
+from catenary.postproc.read.validation import Records
 from catenary.postproc.report import csv_tables
-from catenary.postproc.report.page import page, pdf, refuse_without_pdf
-from catenary.postproc.report.sections import acceptance, contact_force, dynamics, line, run_facts
-from catenary.postproc.report.sections.section import (
+from catenary.postproc.report.page import (
     EvaluatedRun,
     Picture,
     Section,
     SectionEntry,
     has_train,
     number,
+    page,
+    pdf,
+    refuse_without_pdf,
 )
+from catenary.postproc.report.sections import acceptance, dynamics, line, run_facts
 from catenary.postproc.report.summary import as_json, summarise
-from catenary.postproc.standards.quantities import KMH
+from catenary.postproc.standards.rule_books import KMH
 
 logger = logging.getLogger("catenary.report")
 
@@ -45,8 +47,8 @@ SECTIONS: list[SectionEntry] = [
     SectionEntry("verdict", acceptance.status),
     SectionEntry("acceptance", acceptance.section, has_train),
     SectionEntry("checks", run_facts.checks),
-    SectionEntry("force", contact_force.section, has_train),
-    SectionEntry("spectrum", dynamics.section, dynamics.has_statistics, full=True),
+    SectionEntry("force", dynamics.contact_force, has_train),
+    SectionEntry("spectrum", dynamics.spectrum, dynamics.has_statistics, full=True),
     SectionEntry("motion", line.in_motion),
     SectionEntry("places", dynamics.places, dynamics.has_places, full=True),
     SectionEntry("rest", line.at_rest),

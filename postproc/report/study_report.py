@@ -15,9 +15,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.postproc.files.csv_text import csv_text, number_text
-from catenary.postproc.report.page import page
+from catenary.postproc.report.page import Folded, Picture, Section, page
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.sections.section import Folded, Picture, Section
 from catenary.postproc.report.study_table import StudyTable, texts_table, write_files
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "cannot be decided"

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from catenary.postproc.evaluate.terminal_width import terminal_width
-from catenary.postproc.evaluate.wording import without_sign_of_zero
+from catenary.postproc.evaluate.wording import terminal_width, without_sign_of_zero
 from catenary.postproc.files.csv_text import csv_text, number_text
 
 Row = Mapping[str, Any]

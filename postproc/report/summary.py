@@ -13,13 +13,13 @@ import numpy as np
 
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.error_indicators import Indicators, as_table, indicate
-from catenary.postproc.evaluate.lateral_places import as_table as as_lateral_table
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.statistics import PantographStatistics, RunStatistics
+from catenary.postproc.evaluate.statistics import lateral_table as as_lateral_table
 from catenary.postproc.evaluate.verdict import Criterion, judged_by, verdict
 from catenary.postproc.files.disk import plain
 from catenary.postproc.read.results import Results
-from catenary.postproc.standards.quantities import KMH
+from catenary.postproc.standards.rule_books import KMH
 
 
 def summarise(

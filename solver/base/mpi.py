@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from catenary.base.lone_process import settings
+from catenary.base.process import settings
 
 with settings():
     from mpi4py import MPI

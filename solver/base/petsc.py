@@ -10,8 +10,7 @@ import sys
 
 import petsc4py
 
-from catenary.base.lone_process import settings
-from catenary.base.python_signals import python_signals_kept
+from catenary.base.process import python_signals_kept, settings
 
 with python_signals_kept(), settings():  # PETSc starts MPI unless it runs
     if "petsc4py.PETSc" not in sys.modules:

@@ -11,7 +11,7 @@ from catenary.solver.kernels import native
 from catenary.solver.kernels.native import NODE, SAMPLE, SLIP, TOUCH
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+from catenary.solver.statics.form_finding import Equilibrium
 
 # Samples to the shortest wave. A cubic with the heights and slopes of a sine at its ends is off by
 # (k h)^4 / 384 = 2e-4 of its amplitude at most.

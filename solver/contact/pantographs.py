@@ -19,23 +19,19 @@ from catenary.mbs.build import (
     make_pantograph,
     steady_forces,
 )
-from catenary.mbs.called_model import called_by_kernels
-from catenary.mbs.head.head_arrays import N_DRIVE, named
 from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.head.wire_crossing import CrossingPath, FollowedPath, LateralPath
-from catenary.mbs.interface import Pantograph
+from catenary.mbs.head.stepping import CrossingPath, FollowedPath, LateralPath, Stepping
+from catenary.mbs.interface import N_DRIVE, Pantograph, called_by_kernels, named
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.vehicle.base_motion import BaseMotion
+from catenary.mbs.vehicle import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.head_states import Heads
+from catenary.solver.contact.responses import Heads
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import KinematicLaw
-from catenary.solver.problem.problem import Placement, Problem
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.problem.problem import Placement, Problem, Simulated
 from catenary.solver.statics.elasticity import Elasticity
-from catenary.solver.wind.wind_at import airflow
+from catenary.solver.wind import airflow
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.full_pantograph import FullPantograph

@@ -14,7 +14,7 @@ import numpy as np
 
 from catenary.base.mpi import MPI
 from catenary.base.petsc import event
-from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.responses import LineResponse
 from catenary.solver.kernels import native
 
 _FIRST_CAPACITY = 32

@@ -11,8 +11,7 @@ import numpy as np
 from catenary.base.errors import RunBroken
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.problem.problem import Problem, Simulated
 
 
 class LawInSteps:

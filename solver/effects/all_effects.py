@@ -18,9 +18,8 @@ from catenary.solver.effects.shipped import (  # noqa: F401  (registers)
     stiff_link_effects,
     vertical_effects,
 )
-from catenary.solver.model.unknown_registry import Group
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.model.unknowns import Group
+from catenary.solver.problem.problem import Problem, Simulated
 
 
 def registry() -> dict[str, Effect]:

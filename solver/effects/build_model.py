@@ -9,8 +9,7 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.stations import along_the_track
-from catenary.solver.model.unknown_registry import Unknowns, number_unknowns
+from catenary.solver.model.unknowns import Unknowns, along_the_track, number_unknowns
 from catenary.solver.problem.problem import Problem
 
 

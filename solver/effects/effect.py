@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from catenary.meshgen.line import Line
     from catenary.meshgen.wires import Role
     from catenary.solver.model.builder import ModelBuilder
-    from catenary.solver.problem.problem import Problem
-    from catenary.solver.problem.simulated import Simulated
+    from catenary.solver.problem.problem import Problem, Simulated
 
 
 class Limit(Enum):

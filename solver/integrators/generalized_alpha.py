@@ -24,7 +24,7 @@ import numpy as np
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import AlphaAhead
 from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.linear.pieces.operator_pieces import WantedPieces
+from catenary.solver.linear.pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import Integration

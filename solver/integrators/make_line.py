@@ -15,7 +15,7 @@ from catenary.solver.integrators.slow_path import (
     warn_of_slow_path,
 )
 from catenary.solver.kernels import native
-from catenary.solver.linear.pieces.operator_pieces import WantedPieces
+from catenary.solver.linear.pieces import WantedPieces
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.integrator_parameters import NEWMARK, integration_of

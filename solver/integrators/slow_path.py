@@ -10,7 +10,7 @@ from typing import NamedTuple
 from catenary.mbs.build import has_joints
 from catenary.solver.model.loads import FunctionLoad
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknown_registry import Unknowns
+from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Numerics, Problem
 
 logger = logging.getLogger(__name__)

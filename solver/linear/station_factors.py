@@ -16,10 +16,8 @@ import numpy as np
 
 from catenary.base.petsc import PETSc
 from catenary.solver.kernels import native
-from catenary.solver.linear.stations.sections import Sections
-from catenary.solver.linear.stations.station_layout import Layout
-from catenary.solver.linear.stations.station_products import kinds_by_type, of_pairs
-from catenary.solver.linear.stations.station_rows import StationRows
+from catenary.solver.linear.station_products import Layout, kinds_by_type, of_pairs
+from catenary.solver.linear.station_rows import Sections, StationRows
 from catenary.solver.model.alike import numbered
 
 # Distance in stations between the places at which elimination may end, if there are several.

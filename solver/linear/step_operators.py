@@ -17,8 +17,7 @@ from catenary.base.errors import NotConverged, RunBroken
 from catenary.base.mpi import MPI
 from catenary.base.petsc import PETSc, event
 from catenary.solver.kernels import aligned_arrays
-from catenary.solver.linear.halo import Halo, Subdomain
-from catenary.solver.linear.line_products import LineProducts
+from catenary.solver.linear.line_products import Halo, LineProducts, Subdomain
 from catenary.solver.linear.petsc_solvers import (
     DIRECT,
     PREFIX,
@@ -29,12 +28,10 @@ from catenary.solver.linear.petsc_solvers import (
     wants_distributed_solver,
     wants_view,
 )
-from catenary.solver.linear.pieces.operator_pieces import OperatorPieces
+from catenary.solver.linear.pieces import OperatorPieces
 from catenary.solver.linear.station_factors import StationFactors, station_factors
-from catenary.solver.linear.stations.like_stations import LikeStations
-from catenary.solver.linear.stations.sections import Sections
-from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS
-from catenary.solver.linear.stations.station_products import StationProduct
+from catenary.solver.linear.station_products import MOST_UNKNOWNS, StationProduct
+from catenary.solver.linear.station_rows import LikeStations, Sections
 from catenary.solver.linear.unit_responses import Windows
 from catenary.solver.model.matrices import columns_of, part_of
 from catenary.solver.model.model import Model

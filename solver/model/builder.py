@@ -13,7 +13,7 @@ from catenary.solver.model.link_directions import between_nodes, dropper_directi
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, Bends, Direction, Links, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Hanging, Model, wire_elements
-from catenary.solver.model.stations import SAME_STATION
+from catenary.solver.model.unknowns import SAME_STATION
 from catenary.solver.problem.problem import Problem
 
 # Displacements of a node beside its height, in which its masses move as well.

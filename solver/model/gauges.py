@@ -11,10 +11,10 @@ import numpy as np
 
 from catenary.meshgen.wires import End
 from catenary.solver.kernels import native
-from catenary.solver.model import axial_elements, wire_ends
+from catenary.solver.model import axial_motion
 from catenary.solver.model.model import Model
-from catenary.solver.model.stations import SAME_STATION
 from catenary.solver.model.switching_links import RESERVE
+from catenary.solver.model.unknowns import SAME_STATION
 from catenary.solver.problem.ends import Tensioner
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import (
@@ -66,7 +66,7 @@ def gauges_of(model: Model) -> Gauges:
     places = gauge_places(model.problem, "u" in model.unknowns)
     if not places:
         return Gauges((), {})
-    ends = {(end.wire, end.node): end for end in wire_ends.ends_of(model)}
+    ends = {(end.wire, end.node): end for end in axial_motion.ends_of(model)}
     tensioner = model.simulated.tensioner
     width = 10 if model.simulated.lateral else 6
     watched = {
@@ -102,13 +102,13 @@ def _watch_tension(
 ) -> None:
     """Watch the tension of an ``element`` by gauge ``i``; all that it watches has its unknowns."""
     wire = model.problem.line.wires[place.wire]
-    unknowns = axial_elements.unknowns_along(model, wire.name)[element]
+    unknowns = axial_motion.unknowns_along(model, wire.name)[element]
     for table in watched.values():
         _row(table, i, unknowns, place)
     assert wire.axial_stiffness is not None
     left, _ = wire.left_of(model.mesh.x(model.mesh.elements(wire.name)[element])[None])
     tension = watched[TENSION]
-    tension.weights[i] = axial_elements.strain_rows(model, wire.name)[element]
+    tension.weights[i] = axial_motion.strain_rows(model, wire.name)[element]
     tension.law["stiffness"][i] = wire.axial_stiffness * left[0]
     tension.law["rest"][i] = model.tension_of(wire.name)[element]
 
@@ -117,7 +117,7 @@ def _watch_stops(
     model: Model,
     watched: dict[str, native.Links],
     i: int,
-    end: wire_ends.WireEnd,
+    end: axial_motion.WireEnd,
     tensioner: Tensioner,
     outwards: np.ndarray,
     moved: float,
@@ -128,7 +128,7 @@ def _watch_stops(
     """
     if tensioner.travel is None:
         return
-    if not wire_ends.at_stop(model, end):
+    if not axial_motion.at_stop(model, end):
         for name, sign in ((LOW_STOP, 1.0), (HIGH_STOP, -1.0)):
             gap = max(tensioner.travel - sign * moved, 0.0)
             _open(watched[name], i, sign * outwards, gap, tensioner.stop_stiffness)

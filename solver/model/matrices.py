@@ -1,17 +1,109 @@
-"""M, K and C of a model and their sums: whole matrices, parts of rows, PETSc matrices."""
+"""M, K and C of a model and their sums: entries, whole matrices, parts of rows, bands, PETSc's.
+
+Unknowns stand in the order along the track, so that a sum has few bands.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 
-from catenary.solver.model.entries import iterate_entries
-from catenary.solver.model.model import Model
+from catenary.base.errors import RunBroken
+from catenary.solver.model.model import Block, Model
 
 if TYPE_CHECKING:
     from catenary.base.petsc import PETSc
+
+
+def iterate_entries(
+    model: Model,
+    first: int,
+    last: int,
+    mass: float,
+    stiffness: float,
+    damping: float,
+    wanted: np.ndarray | None = None,
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Entries (rows, columns, values) of ``mass`` M + ``stiffness`` K + ``damping`` C.
+
+    Only rows in [first, last), of these ``wanted`` (last - first,) ones if that is given; rows and
+    columns of constrained unknowns are left out.
+    """
+    sums = [(mass, stiffness, damping)]
+    for rows, columns, values in iterate_sums(model, first, last, sums, wanted):
+        yield rows, columns, values[0]
+
+
+def iterate_sums(
+    model: Model,
+    first: int,
+    last: int,
+    sums: Sequence[tuple[float, float, float]],
+    wanted: np.ndarray | None = None,
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """``iterate_entries`` for k sums of M, K and C at once, with values (k, n).
+
+    ``sums`` are their coefficients of M, K and C; ``first``, ``last`` and ``wanted`` select rows as
+    in ``iterate_entries``.
+    """
+    for block in model.blocks:
+        alpha, beta = model.damping_of_block(block)
+        near = block.near(first, last)
+        dofs, kind = block.dofs[near].astype(np.int64), block.kind[near]
+        if wanted is not None:
+            inside = (dofs >= first) & (dofs < last)
+            chosen = (inside & wanted[np.where(inside, dofs - first, 0)]).any(axis=1)
+            dofs, kind = dofs[chosen], kind[chosen]
+        if not kind.size:
+            continue
+        shape = *dofs.shape, dofs.shape[1]
+        rows = np.broadcast_to(dofs[:, :, None], shape)
+        columns = np.broadcast_to(dofs[:, None, :], shape)
+        keep = _kept(model, dofs, first, last)
+        if wanted is not None:
+            keep = np.ones(shape, dtype=bool) if keep is None else keep
+            keep[keep] = wanted[rows[keep] - first]
+        values = [_sum_of(block, alpha, beta, *of)[kind] for of in sums]
+        if keep is None:
+            yield rows.ravel(), columns.ravel(), np.stack([own.ravel() for own in values])
+        else:
+            yield rows[keep], columns[keep], np.stack([own[keep] for own in values])
+
+
+def _sum_of(
+    block: Block, alpha: float, beta: float, mass: float, stiffness: float, damping: float
+) -> np.ndarray:
+    """``mass`` M + ``stiffness`` K + ``damping`` C of the kinds of a block, (k, m, m)."""
+    terms = (
+        (mass + damping * beta, block.mass),
+        (stiffness + damping * alpha, block.stiffness),
+        (damping, block.damping),
+    )
+    there = [(share, own) for share, own in terms if own is not None]
+    total = np.zeros(there[0][1].shape)
+    for share, own in there:
+        if share != 0.0:
+            total += share * own
+    return total
+
+
+def _kept(model: Model, dofs: np.ndarray, first: int, last: int) -> np.ndarray | None:
+    """Mask (n, m, m) of the entries of elements that are in rows from ``first`` to before ``last``
+    and of free unknowns; None if all are."""
+    low, high = int(dofs.min()), int(dofs.max()) + 1  # an element's unknowns are near each other
+    held = model.constrained_between(low, high)
+    inside = first <= low and high <= last
+    if inside and not held.size:
+        return None
+    free = np.ones(high - low, dtype=bool)
+    free[held - low] = False
+    moves = free[dofs - low]
+    mine = moves if inside else moves & (dofs >= first) & (dofs < last)
+    return np.asarray(mine[:, :, None] & moves[:, None, :])
+
 
 # Rows whose entries are put together at once, some 50 MB of them.
 _STRETCH = 2**16
@@ -126,3 +218,73 @@ def columns_of(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
             low = min(low, int(block.dofs[near].min()))
             high = max(high, int(block.dofs[near].max()) + 1)
     return low, high
+
+
+# Unknowns whose bands are put together at once, some ninety spans of two wires: entries of a
+# hundred elements take nearly as long as those of a thousand.
+_AT_ONCE = 2**14
+
+
+class OperatorBands:
+    """Lower bands of A, as LAPACK takes them. Not collective.
+
+    Those of a short line are put together once, for whoever reads them.
+
+    Parameters
+    ----------
+    model : Model
+    coefficients : of M, K and C in A
+    """
+
+    def __init__(self, model: Model, coefficients: tuple[float, float, float]) -> None:
+        self._model, self._coefficients = model, coefficients
+        self._first = self._last = 0
+        self._numbers = np.zeros((1, 0))
+
+    def between(self, first: int, last: int, further: int = 0) -> np.ndarray:
+        """Bands (k, last - first) of A for the columns from ``first`` to before ``last``.
+
+        Entry [i, j] is that of A in row ``first`` + j + i and column ``first`` + j. Entries of rows
+        from ``last`` on are undefined. Columns to before ``further`` are read next.
+        """
+        if first < self._first or last > self._last:
+            if self._model.n_dofs <= _AT_ONCE:
+                self._put_together(0, self._model.n_dofs)
+            else:
+                self._put_together(first, max(last, min(first + _AT_ONCE, further)))
+        numbers = self._numbers[:, first - self._first : last - self._first]
+        bands = max(1, min(len(numbers), last - first))
+        while bands > 1 and not numbers[bands - 1, : last - first + 1 - bands].any():
+            bands -= 1
+        return numbers[:bands]
+
+    def solve(self, first: int, last: int, right: np.ndarray, further: int = 0) -> np.ndarray:
+        """Answers (n, last - first) of the unknowns from ``first`` to before ``last``, alone, to
+        forces ``right`` of the same shape, which are overwritten; ``further`` as in ``between``.
+
+        Raises
+        ------
+        RunBroken
+            If A is not positive definite there.
+        """
+        bands = self.between(first, last, further)
+        try:
+            answers = linalg.solveh_banded(
+                bands, right.T, overwrite_b=True, lower=True, check_finite=False
+            )
+        except linalg.LinAlgError as error:
+            raise RunBroken("the step operator cannot be factored: it is not positive") from error
+        return np.asarray(answers.T)
+
+    def _put_together(self, first: int, last: int) -> None:
+        parts = list(iterate_entries(self._model, first, last, *self._coefficients))
+        held = self._model.constrained_between(first, last)
+        parts.append((held, held, np.ones(held.size)))
+        rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+        lower = (columns <= rows) & (columns >= first)
+        rows, columns, values = rows[lower], columns[lower], values[lower]
+        apart, n = rows - columns, last - first
+        bands = int(apart.max(initial=0)) + 1
+        flat = np.bincount(n * apart + columns - first, weights=values, minlength=n * bands)
+        self._first, self._last = first, last
+        self._numbers = np.asarray(flat, dtype=float).reshape(bands, n)

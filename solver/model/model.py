@@ -13,17 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.hardware import Slopes
-from catenary.meshgen.line import DropperPlace, droppers_at
+from catenary.meshgen.line import DropperPlace, Slopes, droppers_at
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.model.alike import alike
 from catenary.solver.model.links import NO_DROPPERS, Links
 from catenary.solver.model.loads import Load
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.unknown_registry import Unknowns
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.model.unknowns import Unknowns
+from catenary.solver.problem.problem import Problem, Simulated
 
 # Elements of a block that are looked for together: the ends of each are as long as its unknowns.
 _TOGETHER = 16

@@ -34,8 +34,7 @@ from catenary.base.errors import RunBroken
 from catenary.solver.problem.problem import Numerics, n_halvings
 from catenary.solver.schemes.fixed_point import FixedPoint
 from catenary.solver.schemes.make_scheme import Parts
-from catenary.solver.schemes.one_solve import OneSolve
-from catenary.solver.schemes.scheme import Counters, Decision, Scheme, StepRejected
+from catenary.solver.schemes.scheme import Counters, Decision, OneSolve, Scheme, StepRejected
 
 # Steps before this one that the estimate needs.
 _PAST = 3

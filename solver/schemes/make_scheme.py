@@ -10,8 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from catenary.solver.contact.contact_wire import ContactWires
-from catenary.solver.contact.followed_links import FollowedLinks, no_links
-from catenary.solver.contact.forces_on_line import ForceColumns, ForcesOnLine
+from catenary.solver.contact.forces_on_line import (
+    FollowedLinks,
+    ForceColumns,
+    ForcesOnLine,
+    no_links,
+)
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
@@ -22,9 +26,8 @@ from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import switching_links
 from catenary.solver.problem.contact_laws import uses_rate
 from catenary.solver.problem.problem import Problem
-from catenary.solver.schemes.one_solve import OneSolve
-from catenary.solver.schemes.scheme import Scheme
-from catenary.solver.statics.changed_line.after_incidents import ChangedLine
+from catenary.solver.schemes.scheme import OneSolve, Scheme
+from catenary.solver.statics.after_incidents import ChangedLine
 from catenary.solver.window.choice import opens_window
 from catenary.solver.window.moving_window import MovingWindow, wanted_pieces
 

@@ -15,8 +15,8 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.solver.effects.build_model import with_wires_apart
 from catenary.solver.model.link_directions import at_nodes, at_places
+from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
-from catenary.solver.model.operator_bands import OperatorBands
 
 # Length of line to both sides of a stretch in the first solution [m], and motion that is none.
 _FIRST_REACH, _STILL = 1500.0, 1e-13

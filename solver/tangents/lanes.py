@@ -1,16 +1,286 @@
-"""Motions of the line in several tangents, whose numbers stand side by side in lanes."""
+"""Motions of the line in several tangents side by side, and the changes of matrices that load them.
+
+The numbers of an unknown in all tangents stand in lanes. Derivatives of the line's matrices by
+several parameters are in the form that kernels multiply.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import PredictedLineState
-from catenary.solver.kernels import native
-from catenary.solver.tangents.changed_rows import changed_rows
+from catenary.solver.kernels import aligned_arrays, native
+from catenary.solver.model.alike import kinds_of
 from catenary.solver.tangents.set_up import Change
+
+# Numbers of matrices are kept to so many bits, far more than differences of set-ups know: rows of
+# equal elements are equal then.
+_BITS = 40
+# Pairs of rows in a part of the line, whose stations a range that moves takes together.
+_PART = 128
+# Entries of a node of a wire: pairs beside its own, and their unknowns.
+_BESIDE, _UNKNOWN = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 1, 0, 1, 0, 1])
+_NO_NUMBERS = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Pairs of rows in each term, all terms of a pair one after the other.
+
+    Attributes
+    ----------
+    n_terms : of a pair
+    kinds : (n,) of those that have the same entries
+    begin, counts : (n_kinds,) the first entry of a kind, and how many it has
+    ahead : (m,) how many unknowns behind the pair's first one an entry stands
+    entries : (m, 2, n_lanes) of the one row and of the other
+    """
+
+    n_terms: int
+    kinds: np.ndarray
+    begin: np.ndarray
+    counts: np.ndarray
+    ahead: np.ndarray
+    entries: np.ndarray
+
+    @property
+    def pair(self) -> np.ndarray:
+        """The pair of each."""
+        return np.arange(self.kinds.size) // self.n_terms
+
+    @property
+    def term(self) -> np.ndarray:
+        """The term of each."""
+        return np.arange(self.kinds.size) % self.n_terms
+
+    def of(self, kinds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The entries of some kinds, one kind after the other, and which of these each is of."""
+        which = np.repeat(np.arange(kinds.size), self.counts[kinds])
+        ahead = np.arange(which.size) - np.searchsorted(which, which)
+        return self.begin[kinds][which] + ahead, which
+
+
+@dataclass(frozen=True)
+class _Nodes:
+    """Nodes of wires among pairs of rows in each term.
+
+    Attributes
+    ----------
+    kind : (n,) of the node that a pair is, but for further entries; -1 of no node
+    before, after : (n,) the pairs of the nodes beside it, or the pair itself
+    entries : (n_kinds, 6, 2, n_lanes) at both unknowns of the pair before, of its own and of the
+        pair after
+    """
+
+    kind: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    entries: np.ndarray
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The six numbers of each kind (n_kinds, 6, n_lanes), see `native.ChangedRows`."""
+        return -np.stack(
+            [self.entries[:, at, row] for row in (0, 1) for at in (2 + row, 4, 5)], axis=1
+        )
+
+
+def changed_rows(
+    changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray
+) -> native.ChangedRows:
+    """Changes of matrices over all lanes.
+
+    Parameters
+    ----------
+    changes : sequence of Change
+        Changes of set-ups, each in a lane of its own; further lanes have none.
+    n_lanes : int
+        Number of lanes.
+    n : int
+        Number of the line's unknowns.
+    shares : array (5,)
+        Shares of the march's motion, see `Motion` of the kernels.
+    """
+    weights, pairs = _entries(changes, n_lanes, n, shares)
+    nodes = _nodes(pairs, n // 2)
+    runs = _runs(pairs, nodes)
+    rows, begin, ahead, further = _further(pairs, nodes, weights)
+    parts = np.arange((n - 1) // (2 * _PART) + 2)
+    starts = runs[:, 1] // _PART, rows[:, 0] // (2 * _PART)
+    return native.ChangedRows(
+        weights.reshape(-1, 3 * n_lanes),
+        np.stack([np.searchsorted(start, parts) for start in starts], axis=1),
+        runs,
+        aligned_arrays.copy(nodes.numbers).reshape(-1, n_lanes),
+        rows,
+        begin,
+        ahead,
+        aligned_arrays.copy(further).reshape(-1, 3 * n_lanes),
+        _PART,
+    )
+
+
+def _entries(
+    changes: Sequence[Change], n_lanes: int, n: int, shares: np.ndarray
+) -> tuple[np.ndarray, _Pairs]:
+    """Weights (n_terms, 3, n_lanes) of x, y and z in the sums of each term, and all entries.
+
+    The largest matrix of each lane is multiplied with the first sums, its next with the second
+    ones.
+    """
+    # Displacement, velocity and acceleration in terms of x, y and z.
+    of_motion = np.array([shares[:3], [0.0, *shares[3:]], [0.0, 0.0, 1.0]])
+    terms = [
+        (lane, number, term)
+        for lane, change in enumerate(changes)
+        for number, term in enumerate(sorted(change.matrices, key=lambda term: -term.values.size))
+    ]
+    n_terms = 1 + max((number for _, number, _ in terms), default=0)
+    weights = np.zeros((n_terms, 3, n_lanes))
+    rows, columns, lanes, numbers, values = ([_NO_NUMBERS] for _ in range(5))
+    for lane, number, term in terms:
+        weights[number, :, lane] = term.weights @ of_motion
+        rows.append(np.repeat(term.rows, np.diff(term.begin)))
+        columns.append(term.columns)
+        lanes.append(np.full(term.values.size, lane))
+        numbers.append(np.full(term.values.size, number))
+        values.append(_rounded(term.values))
+    row = np.concatenate(rows)
+    # Each entry of a pair of rows once for all lanes, by pairs, terms and columns. With indices,
+    # marks are sorted by merging, which is fast as those of each matrix nearly are.
+    mark = (row // 2 * n_terms + np.concatenate(numbers)) * n + np.concatenate(columns)
+    marks, _, entry = np.unique(mark, return_index=True, return_inverse=True)
+    entries = np.zeros((marks.size, 2, n_lanes))
+    entries[entry, row % 2, np.concatenate(lanes)] = np.concatenate(values)
+    own, column = np.divmod(marks, n)
+    ahead = column - 2 * (own // n_terms)
+    return weights, _kinds(n_terms, own, ahead, entries, (n + 1) // 2)
+
+
+def _kinds(
+    n_terms: int, own: np.ndarray, ahead: np.ndarray, entries: np.ndarray, n_pairs: int
+) -> _Pairs:
+    """Find equal pairs; ``own`` (m,), ascending, are the numbers of those that have the entries."""
+    begin = np.searchsorted(own, np.arange(n_pairs * n_terms + 1))
+    counts = np.diff(begin)
+    marks = np.full((counts.size, counts.max(initial=0)), -1.0)
+    alike = kinds_of(np.c_[ahead, entries[:, 0], entries[:, 1]])[1]
+    marks[own, np.arange(own.size) - begin[own]] = alike
+    first, kinds = kinds_of(marks)
+    return _Pairs(n_terms, kinds, begin[first], counts[first], ahead, entries)
+
+
+def _nodes(pairs: _Pairs, n_whole: int) -> _Nodes:
+    """Nodes of wires between two equal elements, of ``n_whole`` pairs with two rows."""
+    pair, n_terms = pairs.pair, pairs.n_terms
+    # Kinds with the entries of a beam that are even about the node.
+    six = np.flatnonzero(pairs.counts == _BESIDE.size)
+    own = pairs.begin[six, None] + np.arange(_BESIDE.size)
+    ahead = pairs.ahead[own]
+    beside = ahead[:, ::2] // 2
+    is_wire = ahead == 2 * beside[:, _BESIDE] + _UNKNOWN
+    is_wire &= (beside[:, 1] == 0)[:, None]
+    # Deflections load a deflection evenly and a rotation oddly, rotations the other way about.
+    even = np.where(_UNKNOWN[:, None] == [0, 1], 1.0, -1.0)[..., None]
+    entries = pairs.entries[own]
+    is_even = (entries == entries[:, [4, 5, 2, 3, 0, 1]] * even).all(axis=(2, 3))
+    is_node = (is_wire & is_even).all(axis=1)
+    first, alike = kinds_of(entries[is_node].reshape(-1, math.prod(entries.shape[1:])))
+    of_kinds = np.full((pairs.begin.size, 3), [-1, 0, 0])
+    of_kinds[six[is_node]] = np.c_[alike, beside[is_node][:, [0, 2]]]
+    kind, before, after = of_kinds[pairs.kinds].T
+    before, after = pair + before, pair + after
+
+    # Other pairs whose outermost entries are at such a node before and at a pair after.
+    others = np.flatnonzero((kind < 0) & (pairs.counts[pairs.kinds] > 0))
+    at, which = pairs.of(pairs.kinds[others])
+    starts = np.searchsorted(which, np.arange(others.size))
+    reach = pairs.ahead[at] // 2
+    low, high = (pair[others] + ends.reduceat(reach, starts) for ends in (np.minimum, np.maximum))
+    outer = low * n_terms + pairs.term[others]
+    is_between = (kind[outer] >= 0) & (after[outer] == pair[others])
+    is_between &= (high > pair[others]) & (high < n_whole)
+    others, low, high = others[is_between], low[is_between], high[is_between]
+    kind[others], before[others], after[others] = kind[outer[is_between]], low, high
+    return _Nodes(kind, before, after, entries[is_node][first])
+
+
+def _runs(pairs: _Pairs, nodes: _Nodes) -> np.ndarray:
+    """Runs, see `native.ChangedRows`; each is within a part of the line.
+
+    The runs of a wire in a part follow each other.
+    """
+    kind, after = nodes.kind, nodes.after
+    own, term, part = np.arange(kind.size), pairs.term, pairs.pair // _PART
+    following = after * pairs.n_terms + term
+    joins = (kind >= 0) & (kind[following] >= 0) & (nodes.before[following] == pairs.pair)
+    joins &= part[following] == part
+    graph = sparse.csr_matrix((joins[joins], (own[joins], following[joins])), (own.size, own.size))
+    _, wire = csgraph.connected_components(graph, directed=False)
+    order = np.lexsort((wire, term, part))
+    # Every pair has the first term, if only zeros.
+    order = order[(kind >= 0)[order] | (term == 0)[order]]
+    step = np.diff(pairs.pair[order], prepend=0)
+    last, goes_on = order[:-1], np.zeros(order.size, dtype=bool)
+    goes_on[1:] = joins[last] & (following[last] == order[1:]) & (kind[last] == kind[order[1:]])
+    # Another distance to the next node is another run.
+    goes_on[1:] &= ~goes_on[:-1] | (step[1:] == step[:-1])
+    starts = np.flatnonzero(~goes_on)
+    sizes = np.diff(starts, append=order.size)
+    first, last = order[starts], order[starts + sizes - 1]
+    step = np.where(sizes > 1, step[np.minimum(starts + 1, order.size - 1)], 0)
+    ends = [nodes.before[first], pairs.pair[first], after[last]]
+    return np.stack([*ends, sizes, step, kind[first], term[first]], axis=1)
+
+
+def _further(
+    pairs: _Pairs, nodes: _Nodes, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Entries that rows have beside those of nodes, see `native.ChangedRows`."""
+    n_terms = pairs.n_terms
+    before, after = nodes.before - pairs.pair, nodes.after - pairs.pair
+    marks = np.c_[pairs.kinds, nodes.kind, before, after].reshape(-1, 4 * n_terms)
+    first, kind = kinds_of(marks.astype(float))
+    # The first pair of each kind, in all terms.
+    some = (n_terms * first[:, None] + np.arange(n_terms)).ravel()
+    of_some, term = np.divmod(np.arange(some.size), n_terms)
+    own, of_own = pairs.of(pairs.kinds[some])
+    products = pairs.entries[own, :, None] * weights[term[of_own], None]
+    # Nodes have these already.
+    has_node = np.flatnonzero(nodes.kind[some] >= 0)
+    beside = np.c_[before, 0 * before, after][some[has_node]]
+    of_nodes = -nodes.entries[nodes.kind[some[has_node]]][..., None, :]
+    of_nodes = of_nodes * weights[term[has_node], None, None]
+    products = np.concatenate([products, of_nodes.reshape(-1, *products.shape[1:])])
+    ahead = np.append(pairs.ahead[own], 2 * beside[:, _BESIDE] + _UNKNOWN)[:, None] - [0, 1]
+    row = np.append(of_some[of_own], np.repeat(of_some[has_node], _BESIDE.size))
+    row = 2 * row[:, None] + [0, 1]
+    # Entries of a row at one unknown as one, by rows.
+    reach = int(np.abs(ahead).max(initial=0))
+    marks = (row * (2 * reach + 1) + ahead + reach).ravel()
+    order = np.argsort(marks, kind="stable")
+    marks, starts = np.unique(marks[order], return_index=True)
+    sums = np.add.reduceat(products.reshape(-1, *products.shape[2:])[order], starts)
+    stays = sums.any(axis=(1, 2))
+    row, ahead = np.divmod(marks[stays], 2 * reach + 1)
+    begin = np.searchsorted(row, np.arange(2 * first.size + 1))
+    pair = np.arange(kind.size)
+    rows = np.stack([2 * pair[:, None] + [0, 1], 2 * kind[:, None] + [0, 1]], axis=-1)
+    rows = rows.reshape(-1, 2)
+    return rows[np.diff(begin)[rows[:, 1]] > 0], begin, ahead - reach, sums[stays]
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Numbers with ``_BITS`` bits."""
+    mantissa, exponent = np.frexp(values)
+    return np.ldexp(np.round(np.ldexp(mantissa, _BITS)), exponent - _BITS)
 
 
 def groups_of(line: LineIntegrator, changes: Sequence[Change]) -> list[list[int]]:

@@ -18,8 +18,8 @@ from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.model.partition import Ownership
-from catenary.solver.schemes.one_solve import OneSolve
-from catenary.solver.statics.changed_line.after_incidents import divided_by_mass
+from catenary.solver.schemes.scheme import OneSolve
+from catenary.solver.statics.after_incidents import divided_by_mass
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.lanes import groups_of, lanes_of
 from catenary.solver.tangents.set_up import Change, set_up_of

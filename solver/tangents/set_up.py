@@ -16,8 +16,8 @@ import numpy as np
 from scipy import sparse
 
 from catenary.base.errors import InputError
-from catenary.mbs.head.head_arrays import N_DRIVE, drive_width, named
 from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.interface import N_DRIVE, drive_width, named
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule

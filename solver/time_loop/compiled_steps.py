@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 
 from catenary.base.petsc import event
-from catenary.mbs.head.head_arrays import drive_width
-from catenary.mbs.interface import affine
+from catenary.mbs.interface import affine, drive_width
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.kernels import native
-from catenary.solver.schemes.one_solve import OneSolve
-from catenary.solver.schemes.scheme import Scheme
+from catenary.solver.schemes.scheme import OneSolve, Scheme
 from catenary.solver.time_loop.views.observer_list import ObserverList
 from catenary.solver.time_loop.views.observers import StepView
 from catenary.solver.time_loop.views.step_views import Showing

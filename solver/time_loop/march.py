@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import CatenaryError, InputError, RunBroken
-from catenary.base.freed_memory import give_back
 from catenary.base.mpi import MPI
 from catenary.base.petsc import PETSc
+from catenary.base.process import give_back
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import simulated
@@ -34,12 +34,11 @@ from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.incidents import Happened, LineIncident, in_steps
+from catenary.solver.problem.defects import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.make_scheme import Parts, make_parts
-from catenary.solver.schemes.one_solve import OneSolve
-from catenary.solver.schemes.scheme import Scheme
-from catenary.solver.statics.changed_line.after_incidents import (
+from catenary.solver.schemes.scheme import OneSolve, Scheme
+from catenary.solver.statics.after_incidents import (
     ChangedLine,
     acceleration_jump,
     changed_line,
@@ -47,7 +46,7 @@ from catenary.solver.statics.changed_line.after_incidents import (
     unchanged,
 )
 from catenary.solver.statics.elasticity import Elasticity
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.time_loop.compiled_steps import compiled_steps
 from catenary.solver.time_loop.ts_stepper import Stepper, ts_of
 from catenary.solver.time_loop.views.observer_list import ObserverList

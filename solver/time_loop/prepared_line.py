@@ -11,16 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.files import appears_whole
 from catenary.base.options import option
-from catenary.base.whole_files import appears_whole
-from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
 from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.interface import Pantograph
+from catenary.mbs.interface import N_DRIVE, Pantograph, drive_width
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.kernels import native
 from catenary.solver.model.beam import MOST_ROTATION
-from catenary.solver.schemes.one_solve import OneSolve
+from catenary.solver.schemes.scheme import OneSolve
 from catenary.solver.time_loop.compiled_steps import CompiledSteps
 from catenary.solver.time_loop.march import March
 

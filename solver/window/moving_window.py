@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from catenary.solver.kernels import native
-from catenary.solver.linear.pieces.operator_pieces import OperatorPieces, WantedPieces
+from catenary.solver.linear.pieces import OperatorPieces, WantedPieces
 from catenary.solver.linear.station_factors import StationFactors
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Model

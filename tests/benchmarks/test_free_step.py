@@ -16,7 +16,7 @@ from scenes import load_scene, mesh_of, problem_of
 
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.partition import distribute
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 ROUNDS, CALLS = 60, 60
 # Spans of 50 to 58 m, no two alike, but for the five of the transition.

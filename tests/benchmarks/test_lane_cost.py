@@ -9,8 +9,7 @@ from mpi4py import MPI
 from scenes import load_scene
 
 from catenary.cases.run.prepared import sound_rest
-from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
-from catenary.solver.ensemble.shared_line import SharedLine
+from catenary.solver.ensemble import SceneHistory, SharedLine, march_side_by_side
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.statics.line_at_rest import LineAtRest

@@ -14,14 +14,14 @@ from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 from step_cost import room
 
-from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, in_turns
+from catenary.cases.studies.effect_cost import RepeatedMarch, in_turns
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.links import Direction, law
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics
 from catenary.solver.statics.line_at_rest import line_at_rest
-from catenary.solver.wind.drag import along
+from catenary.solver.wind import along
 
 PLANE = ("v", "theta_z")
 WIND = 8.0  # [N/m]

@@ -16,14 +16,12 @@ from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 
 from catenary.mbs.build import Operation, PantographData, make_pantograph
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning
-from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.vehicle.base_motion import BaseMotion, VehicleMotion
-from catenary.mbs.vehicle.irregularity import Irregularity
+from catenary.mbs.vehicle import BaseMotion, Irregularity, VehicleMotion
 from catenary.solver.statics.elasticity import elasticity, middle_span
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 from catenary.solver.time_loop.march import March
 
 CASE = "ambrosio2012"

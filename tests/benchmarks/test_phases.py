@@ -13,7 +13,7 @@ from scenes import load_scene, mesh_of, problem_of
 
 from catenary.base.petsc import EVENTS
 from catenary.solver.statics.elasticity import elasticity, middle_span
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 from catenary.solver.time_loop.march import March
 
 N_STEPS = 5000

@@ -12,9 +12,9 @@ import pytest
 from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.run.planning.needs import needs_before_meshing
+from catenary.cases.run.needs import needs_before_meshing
 from catenary.cases.scene.input.case_files import shipped
-from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, in_turns
+from catenary.cases.studies.effect_cost import RepeatedMarch, in_turns
 from catenary.solver.problem.problem import steps_of
 from catenary.solver.statics.line_at_rest import line_at_rest
 
@@ -42,5 +42,5 @@ def test_estimates_of_the_plan_differ_from_steps_alike() -> None:
     for name, least in sorted(found.items(), key=lambda one: one[1]):
         print(f"{name:22}{least:10.1f}{estimates[name]:8.1f}   {ratios[name] / usual:.2f}")
     # The model was fitted to marches with their records, which add up to a third to a step, within
-    # 40 % (``cost_model.py``). Beyond a factor of three a plan would mislead.
+    # 40 % (``checks/mesh_size.py``). Beyond a factor of three a plan would mislead.
     assert all(1 / 3 < ratio / usual < 3.0 for ratio in ratios.values())

@@ -17,13 +17,13 @@ from mpi4py import MPI
 from repeating_line import layout, line, station_factors, station_product
 from scenes import load_scene, mesh_of, problem_of
 
+from catenary.solver.integrators.line_integrator import StationPasses
 from catenary.solver.integrators.line_state import Newmark, PredictedLineState
 from catenary.solver.integrators.make_line import NewmarkLine
-from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import aligned_arrays
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.partition import distribute
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 N_STATIONS, PERIOD = 1126, 45
 STEPS = Newmark(1e-3, 2.5e-7, 5e-4, 0.003, 2.5e-7, 5e-4, 0.0)

@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, in_turns
+from catenary.cases.studies.effect_cost import RepeatedMarch, in_turns
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 LUMPED = 'train.pantographs=[{name="lumped"}]'

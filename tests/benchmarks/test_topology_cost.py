@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside
+from catenary.cases.studies.effect_cost import RepeatedMarch, beside
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 # Case, changes, what makes the line without it, and how much dearer it may be. A third wire all

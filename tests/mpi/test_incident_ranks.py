@@ -23,9 +23,9 @@ from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
+from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView

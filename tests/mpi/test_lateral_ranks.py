@@ -10,7 +10,7 @@ from rank_histories import on_one
 from small_lines import EN_PANTOGRAPH, WHOLE, ac_simple_line, mesh_of, problem_of, train
 
 from catenary.mbs.head.strips import Turning
-from catenary.meshgen.track import Curve
+from catenary.meshgen.line import Curve
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView

@@ -18,9 +18,9 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics
-from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.problem.defects import DropperBreak
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
-from catenary.solver.wind.drag import along
+from catenary.solver.wind import along
 
 WORLD = MPI.COMM_WORLD
 SCENE = (

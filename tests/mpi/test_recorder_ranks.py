@@ -18,8 +18,7 @@ import pytest
 from mpi4py import MPI
 
 from catenary import RunBroken
-from catenary.postproc.channels.header import Header
-from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.channels.header import Header, LineRecord
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
 from catenary.postproc.read.results import Results

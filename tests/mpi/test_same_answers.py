@@ -20,7 +20,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 # The parallel solve leaves a relative residual of 1e-16 a step; over some thousand steps of a
 # lightly damped line that grows at most in proportion, and 1e-9 leaves room for a run ten times

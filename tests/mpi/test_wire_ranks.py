@@ -11,7 +11,7 @@ from small_lines import WHOLE, mesh_of, problem_of, train
 
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.solver.problem.incidents import DropperBreak, TensionLoss
+from catenary.solver.problem.defects import DropperBreak, TensionLoss
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView

@@ -34,7 +34,7 @@ from catenary.base.parallel import on_root
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories
-from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.problem.defects import DropperBreak
 
 pytestmark = pytest.mark.study
 

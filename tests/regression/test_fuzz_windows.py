@@ -17,7 +17,7 @@ from windowed import COMM, apart, largest, march, nudged
 from catenary import InputError
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.runs import RunHistories
-from catenary.solver.linear.pieces import pieces
+from catenary.solver.linear import pieces
 from catenary.solver.problem.problem import BOUNDED, EXACT, WindowChoice
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.window import moving_window

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from program import catenary, catenary_started, n_rows
 
-from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.film_data import Snapshots
 from catenary.postproc.read.results import Results
 
 # A run that takes several times as long as film and view, with snapshots 20 ms apart.

@@ -14,8 +14,8 @@ from program import SHORT_SCENE, catenary, write_program
 from scenes import load_scene
 
 from catenary import InputError
-from catenary.cases.run.planning.needs import NeedsOfRuns, total_needs
-from catenary.cases.run.planning.slurm_script import SlurmJob, array_script
+from catenary.cases.run.cluster import SlurmJob, array_script
+from catenary.cases.run.needs import NeedsOfRuns, total_needs
 
 pytestmark = pytest.mark.process
 CASE, VARIED = "en50318_2002", "train.speed_km_h=230,250,270"

@@ -13,7 +13,7 @@ from program import SHORT_SCENE, assert_same_histories, catenary, short_run, wri
 
 from catenary import InputError
 from catenary import open as open_run
-from catenary.cases.run.planning.slurm_script import SlurmJob, limit_minutes, slurm_script
+from catenary.cases.run.cluster import SlurmJob, limit_minutes, slurm_script
 
 # Some four seconds of march, so that a signal meets it.
 SCENE = ["numerics.dt_s=5e-5"]

@@ -17,7 +17,7 @@ from scenes import with_words
 from studies import few
 
 import catenary
-from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.film_data import Snapshots
 from catenary.postproc.read.results import Results
 
 N_SPANS, SPAN, START, STEPS = 60, 54.0, 1620.0, 800

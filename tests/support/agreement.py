@@ -18,8 +18,7 @@ from seven_bodies import HEAD, UPRIGHT, at_rest, calibrated, lively_load, presse
 from variable_steps import integrate
 
 from catenary.mbs.rigid.forces import Actuator
-from catenary.mbs.rigid.implicit_steps import Stepper
-from catenary.mbs.rigid.step_solvers import METHODS
+from catenary.mbs.rigid.implicit_steps import METHODS, Stepper
 
 # Heights are kept at these intervals [s].
 EVERY = 0.25

@@ -11,13 +11,10 @@ from scipy.interpolate import CubicSpline
 from catenary import InputError
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
-from catenary.mbs.rigid.arrays import ORIGIN, TimeLaw
-from catenary.mbs.rigid.bodies import Body, Motion, Vector, normalised
+from catenary.mbs.rigid.bodies import Body, Law, Motion, Vector, normalised, point
 from catenary.mbs.rigid.forces import BetweenPoints, BumpStop, Force, Gravity, SpringDamper
-from catenary.mbs.rigid.joints import unit
-from catenary.mbs.rigid.kinematics import Law, point
-from catenary.mbs.rigid.least_squares import null_space
-from catenary.mbs.rigid.system import System
+from catenary.mbs.rigid.joints import ORIGIN, TimeLaw, unit
+from catenary.mbs.rigid.system import System, null_space
 
 
 class LineBetween(NamedTuple):

@@ -17,8 +17,7 @@ from body_mechanics import place_rates
 from scipy import linalg
 
 from catenary import RunBroken
-from catenary.mbs.rigid.bodies import Motion
-from catenary.mbs.rigid.kinematics import Quantity
+from catenary.mbs.rigid.bodies import Motion, Quantity
 from catenary.mbs.rigid.system import System, independent_rows
 
 

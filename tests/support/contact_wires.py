@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from small_lines import WHOLE, en50318_line, numerics, problem_of, train
 
-from catenary.meshgen.hardware import Droppers
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import Droppers, Line
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import Piece, Role, Section
 from catenary.solver.problem.contact_laws import LinearLaw

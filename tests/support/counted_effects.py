@@ -10,14 +10,11 @@ import numpy as np
 from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, problem_of, train
 
 from catenary.mbs.air import Polynomial, Uplift
-from catenary.mbs.control import Regulation
-from catenary.mbs.head.laws import Law
+from catenary.mbs.head.laws import Law, Regulation
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.lowering import Lowering
-from catenary.mbs.vehicle.base_motion import Harmonic, VehicleMotion
-from catenary.mbs.vehicle.suspension import Vehicle
-from catenary.meshgen.hardware import Fittings
-from catenary.meshgen.line import DropperPlace
+from catenary.mbs.vehicle import Harmonic, Vehicle, VehicleMotion
+from catenary.meshgen.line import DropperPlace, Fittings
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
@@ -25,15 +22,18 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.defects import (
+    DropperBreak,
     HardSpot,
+    Heights,
+    Irregularities,
     Kink,
+    LengthErrors,
     LooseClamp,
     MissingDropper,
+    TensionLoss,
     WornWire,
     WrongTension,
 )
-from catenary.solver.problem.incidents import DropperBreak, TensionLoss
-from catenary.solver.problem.irregularities import Heights, Irregularities, LengthErrors
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.wind import Gusts, Wind
 

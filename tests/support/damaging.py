@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
-from catenary.postproc.files.hdf5.checked import ARRAYS_SUM, ATTRIBUTE_SUMS
+from catenary.postproc.files.hdf5 import ARRAYS_SUM, ATTRIBUTE_SUMS
 
 
 class Mutation(NamedTuple):

@@ -7,10 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from catenary.mbs.rigid.arrays import MadeRows, Product, TimeLaw
-from catenary.mbs.rigid.bodies import Vector
-from catenary.mbs.rigid.joints import across_axis, unit
-from catenary.mbs.rigid.kinematics import Law, Quantity
+from catenary.mbs.rigid.bodies import Law, Quantity, Vector
+from catenary.mbs.rigid.joints import MadeRows, Product, TimeLaw, across_axis, unit
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ from typing import Any
 
 from scenes import Scene, line_of, resolved
 
-from catenary.meshgen.hardware import DropperKind, Droppers, SteadyArm
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import DropperKind, Droppers, Line, SteadyArm
 from catenary.meshgen.wires import End, Profile, Wire
 
 # Tables and keys of ``line`` that a free line does without.

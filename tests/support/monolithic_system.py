@@ -22,13 +22,13 @@ from catenary.mbs.head.stepping import Raising
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.beam import shape_slopes, shape_values
-from catenary.solver.model.entries import iterate_entries
+from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import some_of, switching_links
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium
-from catenary.solver.wind.wind_at import airflow
+from catenary.solver.statics.form_finding import Equilibrium
+from catenary.solver.wind import airflow
 
 
 class WholeSystem:

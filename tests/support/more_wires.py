@@ -8,11 +8,15 @@ from dataclasses import replace
 
 from small_lines import en50318_line
 
-from catenary.meshgen.hardware import DropperKind
-from catenary.meshgen.line import Line
-from catenary.meshgen.topologies.all_topologies import AUXILIARY_WIRE, STITCH_WIRE, simple_catenary
+from catenary.meshgen.line import DropperKind, Line
+from catenary.meshgen.topologies.all_topologies import (
+    AUXILIARY_WIRE,
+    STITCH_WIRE,
+    register,
+    simple_catenary,
+    unregister,
+)
 from catenary.meshgen.topologies.line_data import AuxiliaryWire, ClampedWire, LineData
-from catenary.meshgen.topologies.registry import register, unregister
 from catenary.meshgen.wires import Conductor, Piece, Role, Wire
 
 AUXILIARY, STITCH = AUXILIARY_WIRE, STITCH_WIRE

@@ -9,12 +9,10 @@ import pytest
 from scipy import sparse
 
 from catenary.solver.linear import station_factors as factored
+from catenary.solver.linear import station_products as multiplied
 from catenary.solver.linear.station_factors import StationFactors
-from catenary.solver.linear.stations import station_products as multiplied
-from catenary.solver.linear.stations.sections import Sections, places_of
-from catenary.solver.linear.stations.station_layout import Layout
-from catenary.solver.linear.stations.station_products import StationProduct, layout_of
-from catenary.solver.linear.stations.station_rows import StationRows
+from catenary.solver.linear.station_products import Layout, StationProduct, layout_of
+from catenary.solver.linear.station_rows import Sections, StationRows, places_of
 
 # Unknowns of stations, plane by plane, whose loops shipped cases need in any case. Loops of others
 # take some seconds each to compile, and are left to whole studies.

@@ -15,8 +15,7 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.case_files import find_case, shipped
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import load_scene, read_draft, scene_from
-from catenary.cases.scene.problem import line_of, problem_of, resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, line_of, problem_of, resolved
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.scenes import Scene as SceneOfUsers
 

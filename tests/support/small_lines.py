@@ -10,20 +10,13 @@ from plain_mesh import mesh_on
 
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.geometry import find_cuts
-from catenary.meshgen.hardware import DropperKind, SteadyArm
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import DropperKind, Line, SteadyArm
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.problem.problem import (
-    Damping,
-    Numerics,
-    Placement,
-    Problem,
-    Train,
-)
+from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 
 # Wires without anything that damps or hangs on them; the least that a march can be made of.
 BARE = frozenset({"vertical"})

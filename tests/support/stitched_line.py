@@ -11,7 +11,7 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Conductor, Piece, Role, Wire
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 STITCH = "stitch_wire"
 

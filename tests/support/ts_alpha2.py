@@ -23,7 +23,7 @@ from catenary.solver.problem.integrator_parameters import GENERALIZED_ALPHA, NEW
 from catenary.solver.problem.problem import Numerics, Problem
 from catenary.solver.schemes.make_scheme import SCHEMES
 from catenary.solver.schemes.scheme import Counters, find_crossings
-from catenary.solver.statics.changed_line.after_incidents import ChangedLine
+from catenary.solver.statics.after_incidents import ChangedLine
 
 # Norm of what may be left of the forces [N], and what short steps add to it by round-off of
 # inertia forces, some ten times eps of masses below 100 kg and ways below 0.1 m [N s2].

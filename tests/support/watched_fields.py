@@ -10,7 +10,7 @@ import numpy as np
 import pyvista
 
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
-from catenary.postproc.record.snapshots.blocks import ARMS, MASTS
+from catenary.postproc.record.snapshots.contents import ARMS, MASTS
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 
 BLOCKS = (CONTACT_WIRE, MESSENGER_WIRE, DROPPERS, ARMS, MASTS)

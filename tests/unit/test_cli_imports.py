@@ -151,7 +151,7 @@ def test_a_run_loads_filters_and_pictures_after_its_march(ran: tuple[Path, list[
     assert code == 0
     assert {"petsc4py", "h5py"} <= set(begun)
     assert not (REPORTED | NEVER | OF_OTHERS) & set(begun)
-    assert {"catenary.solver.schemes.one_solve", "catenary.mbs.lumped"} <= set(begun)
+    assert {"catenary.solver.schemes.scheme", "catenary.mbs.lumped"} <= set(begun)
     assert REPORTED <= set(ended)
     assert not NEVER & set(ended)
 

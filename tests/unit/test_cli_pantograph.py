@@ -12,9 +12,9 @@ import verb_runner
 from measuring import check
 from scenes import load_scene, problem_of, shipped
 
-from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.input.case_files import read_toml
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.response.linearisation import of_chain
+from catenary.mbs.response import of_chain
 
 
 def invoke(*words: str) -> Any:

@@ -8,18 +8,14 @@ import pytest
 from scenes import load_scene, mesh_of, problem_of, with_words
 
 import catenary
-from catenary.cases.run.planning.needs import (
-    LEAST_FLUSH,
-    Needs,
-    flush_cadence,
-    needs_before_meshing,
-)
-from catenary.cases.run.planning.plan import make_plan
-from catenary.cases.scene.checks.mesh_size import Size, size_of
-from catenary.cases.scene.cost_model import (
+from catenary.cases.run.needs import LEAST_FLUSH, Needs, flush_cadence, needs_before_meshing
+from catenary.cases.run.plan import make_plan
+from catenary.cases.scene.checks.mesh_size import (
+    Size,
     estimate_march,
     estimate_memory,
     estimate_start,
+    size_of,
 )
 from catenary.solver.window.choice import moving_share
 

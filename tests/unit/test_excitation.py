@@ -8,7 +8,7 @@ from small_lines import BARE, bare_wires, mesh_of, problem_of, train
 
 from catenary import InputError
 from catenary.cases.studies.asked import Excited
-from catenary.cases.studies.waves.excited import excitation_of, without_train
+from catenary.cases.studies.waves.study import excitation_of, without_train
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.loads import FieldLoad, ShapeLoad
 from catenary.solver.problem.problem import Problem

@@ -19,17 +19,15 @@ from catenary.cases.run.continuing import state_to_continue
 from catenary.cases.run.excited_run import ExcitedRun
 from catenary.cases.run.runner import run_case
 from catenary.cases.studies.asked import Excited
-from catenary.cases.studies.waves.excited import Watch, excitation_of, without_train
 from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, waves_seen
-from catenary.cases.studies.waves.study import study_waves
+from catenary.cases.studies.waves.study import Watch, excitation_of, study_waves, without_train
 from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.run_schema import RunAttributes
 from catenary.postproc.film import animate
-from catenary.postproc.film.chart import RingingChart
-from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.drawing import RingingChart
+from catenary.postproc.film.film_data import Snapshots, film_data
 from catenary.postproc.film.options import FilmOptions
 from catenary.postproc.film.scenery import Scenery
-from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import line_pictures

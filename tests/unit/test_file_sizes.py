@@ -13,16 +13,11 @@ from scenes import Scene, load_scene, mesh_of, with_words
 import catenary
 from catenary import InputError, RunBroken
 from catenary.base.parallel import on_root
-from catenary.cases.run.planning.needs import (
-    Kept,
-    needs_before_meshing,
-    needs_with_mesh,
-    total_size,
-)
+from catenary.cases.run.needs import Kept, needs_before_meshing, needs_with_mesh, total_size
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.cost_model import estimate_memory
+from catenary.cases.scene.checks.mesh_size import estimate_memory
 from catenary.cases.terminal import console
-from catenary.postproc.channels.line_record import GZIP
+from catenary.postproc.channels.header import GZIP
 from catenary.postproc.read.results import Results
 
 # 0.45 s on a line of 22 spans.

@@ -21,12 +21,12 @@ from pixels import FIGURES, PAINTERS
 from scenes import Scene, load_scene, resolved
 
 from catenary import InputError
+from catenary.cases.studies import full_report
 from catenary.cases.studies.accuracy.analysis import Row
 from catenary.cases.studies.accuracy.axes import AXES
 from catenary.cases.studies.accuracy.output import table_of
 from catenary.cases.studies.accuracy.runs import make_plan
-from catenary.cases.studies.effect_cost.output import files_of
-from catenary.cases.studies.effect_cost.study import (
+from catenary.cases.studies.effect_cost import (
     UNSWITCHED,
     CostOptions,
     Costs,
@@ -34,19 +34,14 @@ from catenary.cases.studies.effect_cost.study import (
     Size,
     Switch,
     SwitchableEffects,
+    files_of,
 )
-from catenary.cases.studies.full_report import data_sheets
-from catenary.cases.studies.full_report.scene_of_run import (
-    SceneOfRun,
-    measured_costs,
-    measured_errors,
-)
+from catenary.cases.studies.full_report import SceneOfRun, measured_costs, measured_errors
 from catenary.cases.studies.reference.judgement import FAILED, PASSED
-from catenary.cases.studies.reference.pages import validation_files
-from catenary.cases.studies.reference.validation import Step, Validation
+from catenary.cases.studies.reference.validation import Step, Validation, validation_files
 from catenary.postproc.files.own_files import OWN_FILES
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures import channel_pictures, interactive
+from catenary.postproc.report.pictures import interactive, line_pictures
 from catenary.postproc.report.study_table import write_files
 from catenary.solver.time_loop.views.channels import CHANNELS
 
@@ -195,7 +190,7 @@ def test_the_stagger_of_twins_is_that_of_both_wires() -> None:
     """0.2 m to either side, and the wires 30 mm to either side of it."""
     recorded = resolved(load_scene("dc_twin", shortened=True))
     scene = SceneOfRun(_Recorded(recorded))  # type: ignore[arg-type]
-    _, geometry, *_ = data_sheets.line(scene, None).blocks  # type: ignore[arg-type]
+    _, geometry, *_ = full_report.line_section(scene, None).blocks  # type: ignore[arg-type]
     told = {row[0]: row[1:] for row in geometry.texts()}  # type: ignore[union-attr]
     assert told["stagger there, to the left"] == ["-0.230 to 0.230", "m"]
 
@@ -204,7 +199,7 @@ def test_the_data_sheet_tells_the_wind() -> None:
     """Speeds at the wires by the logarithmic law, ln(z / z0) / ln(10 m / z0) of that at 10 m."""
     recorded = resolved(load_scene("windy_viaduct", shortened=True))
     scene = SceneOfRun(_Recorded(recorded))  # type: ignore[arg-type]
-    blocks = data_sheets.line(scene, None).blocks  # type: ignore[arg-type]
+    blocks = full_report.line_section(scene, None).blocks  # type: ignore[arg-type]
     table = next(block for block in blocks if getattr(block, "title", "") == "Wind")
     rows = {row[0]: row[1:] for row in table.texts()}
     for name, height in (("at the wires", 6.0), ("from 660 to 1100 m", 31.0)):
@@ -244,7 +239,7 @@ def test_a_scene_of_another_version_costs_the_data_sheets_alone(
     def refuse(*_: object) -> None:
         raise InputError("overhead is no key")
 
-    monkeypatch.setattr("catenary.cases.studies.full_report.scene_of_run.recorded_scene", refuse)
+    monkeypatch.setattr("catenary.cases.studies.full_report.recorded_scene", refuse)
     said = invoke("report", str(tmp_path))
     assert "the report has no data sheets: overhead is no key" in said
     page = (tmp_path / "report.html").read_text()
@@ -405,8 +400,8 @@ def test_a_channel_of_some_millimetres_is_drawn_in_millimetres(tmp_path: Path) -
     name = "lateral_displacement"
     with Results(tmp_path) as results:
         largest = 1e3 * float(np.nanmax(results.column(name, 0)))
-        drawn = {file: draw for file, _, draw in channel_pictures.channel_pictures(results)}
-        figure = drawn[channel_pictures.picture_name(CHANNELS[name])]()
+        drawn = {file: draw for file, _, draw in line_pictures.channel_pictures(results)}
+        figure = drawn[line_pictures.picture_name(CHANNELS[name])]()
     assert figure is not None and 1.0 < largest < 100.0
     (axes,) = figure.axes
     assert axes.get_ylabel() == "lateral displacement [mm]"

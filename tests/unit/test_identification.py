@@ -23,11 +23,11 @@ from catenary import InputError
 from catenary.cases.studies.identification.measurement import (
     Measurement,
     Signal,
+    Task,
     Whitening,
     correlation,
 )
-from catenary.cases.studies.identification.output import verdict
-from catenary.cases.studies.identification.pictures import draw_parameters, draw_passage
+from catenary.cases.studies.identification.output import draw_parameters, draw_passage, verdict
 from catenary.cases.studies.identification.posterior import (
     innovations_of,
     is_doubtful,
@@ -35,9 +35,7 @@ from catenary.cases.studies.identification.posterior import (
     posterior_of,
 )
 from catenary.cases.studies.identification.study import Identification, Unknown
-from catenary.cases.studies.identification.task import Task
-from catenary.cases.studies.measured.description import Measured
-from catenary.cases.studies.measured.passages import column_of, read_table
+from catenary.cases.studies.measured import Measured, column_of, read_table
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate import filters
 

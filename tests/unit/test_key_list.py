@@ -7,7 +7,7 @@ from scenes import load_scene
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.scene.keys.usual_values import USUAL
+from catenary.cases.scene.keys.units import USUAL
 from catenary.cases.terminal.lists import key_details, key_table, keys_of_a_scene
 
 WIRES = ("contact", "messenger", "auxiliary", "stitch")

@@ -164,7 +164,7 @@ def test_a_mesh_library_is_imported_in_one_file(module: str, only: str) -> None:
 
 def test_mpi_starts_in_one_way() -> None:
     """What imports it from mpi4py itself starts a lone process as one of a job."""
-    start = {"solver/base/mpi.py", "solver/base/lone_process.py", "solver/base/parallel.py"}
+    start = {"solver/base/mpi.py", "solver/base/process.py", "solver/base/parallel.py"}
     users = {str(path.relative_to(ROOT)) for path in FILES if "mpi4py.MPI" in imports_of(path)}
     assert users == start
 
@@ -191,7 +191,7 @@ TAKEN_BY_BOTH = {
     "catenary.cases.studies.sweep.together.Marching",
     "catenary.cases.studies.sweep.variants.check_keys",
     "catenary.cases.studies.sweep.variants.product",
-    "catenary.cases.run.planning.plan.make_plan",  # submit: two figures, no table
+    "catenary.cases.run.plan.make_plan",  # submit: two figures, no table
     "catenary.cases.studies.planned_sweep.plan_sweep",  # checked scenes, of which none is run
     "catenary.cases.studies.records.held_study",  # numerics: studies that the face has not
 }

@@ -21,15 +21,13 @@ from scipy import signal, stats
 
 from catenary import InputError
 from catenary.cases.run.runner import run_case
-from catenary.cases.studies.measured.description import Description
-from catenary.cases.studies.measured.passages import passage_of
+from catenary.cases.studies.measured import Description, passage_of
 from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, PASSED, any_failed
 from catenary.cases.studies.reference.validation import line_test
 from catenary.cases.studies.task_files import checked_table
-from catenary.postproc.evaluate.compare import compare
-from catenary.postproc.evaluate.span_differences import SpanSums, differences, span_sums
+from catenary.postproc.evaluate.compare import SpanSums, compare, differences, span_sums
 from catenary.postproc.files.run_schema import COMPLETE
-from catenary.postproc.measurements import output
+from catenary.postproc.measurements import compared
 from catenary.postproc.measurements.alignment import align, correlation_time
 from catenary.postproc.measurements.compared import Comparison
 from catenary.postproc.measurements.comparison import compare_with
@@ -495,7 +493,7 @@ def test_a_validation_takes_a_comparison_as_its_line_test(
 ) -> None:
     """A force sensor shows 4 N too much, of which the description allows 2.5 N."""
     off = table.assign(force_N=table["force_N"] + 4.0)
-    output.write(tmp_path, found_in(run, off, tolerances={"mean_N": 2.5}))
+    compared.write(tmp_path, found_in(run, off, tolerances={"mean_N": 2.5}))
     step = line_test(tmp_path)
     rows = {row["quantity"]: row for row in step.rows}
     mean = rows["mean [N]"]

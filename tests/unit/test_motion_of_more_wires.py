@@ -22,11 +22,11 @@ from static_line import absolute_rest, first_rest
 from catenary.meshgen.line import DropperPlace, Line
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line
-from catenary.solver.problem.incidents import DropperBreak, TensionLoss
+from catenary.solver.problem.defects import DropperBreak, TensionLoss
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.changed_line.after_incidents import changed_line
+from catenary.solver.statics.after_incidents import changed_line
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 def small(topology: str) -> Line:

@@ -20,7 +20,7 @@ from catenary.cases.run.runner import run_case
 from catenary.postproc.files.run_schema import FORMAT
 from catenary.postproc.read.results import Results
 from catenary.solver.time_loop import march as time_loop
-from catenary.solver.time_loop.views import row_layout
+from catenary.solver.time_loop.views import step_views
 from catenary.solver.time_loop.views.channels import (
     CHANNELS,
     DROPPER,
@@ -146,17 +146,17 @@ def test_an_energy_is_recorded_read_and_drawn(
     assert (tmp_path / "channel_total.png").stat().st_size > 5000
 
 
-def layout_of(array: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> row_layout.RowLayout:
+def layout_of(array: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> step_views.RowLayout:
     """Of a row with one channel more than four numbers that are shown anyway, two of them its."""
     shown = np.arange(4.0)
     channels = (
         Channel("two", "m", "in what is shown", DROPPER, lambda now: now.dropper_force),
         Channel("more", "m", "from elsewhere", DROPPER, lambda now: array),
     )
-    monkeypatch.setattr(row_layout, "CHANNELS", {channel.name: channel for channel in channels})
+    monkeypatch.setattr(step_views, "CHANNELS", {channel.name: channel for channel in channels})
     none = SimpleNamespace(outputs=np.zeros(0))
     sources = Sources(none, none, none, shown[:2], shown[2:], {})  # type: ignore[arg-type]
-    return row_layout.RowLayout(sources, shown)
+    return step_views.RowLayout(sources, shown)
 
 
 def test_a_row_ends_with_what_stands_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,16 +27,15 @@ from small_lines import HANGING, mesh_of, problem_of
 
 from catenary import InputError
 from catenary.meshgen.build import make_mesh, use_mesh
-from catenary.meshgen.hardware import DropperKind, Droppers
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import DropperKind, Droppers, Line
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, LineMesh, elements_of
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.header import line_datasets
-from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
+from catenary.postproc.record.snapshots.contents import RecordedLine, blocks_of
 from catenary.solver.model.beam import uniform_load
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding import Equilibrium, find_form
 
 GRAVITY = 9.81
 

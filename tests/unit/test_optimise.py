@@ -17,12 +17,13 @@ from verb_runner import invoke
 import catenary
 from catenary import InputError
 from catenary.cases.result_folder.folder_lock import FolderLock
-from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.run.at_rest import static_table
 from catenary.cases.scene.line.line_data import span_lengths
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies import scene_sets
 from catenary.cases.studies.optimise import output, study
-from catenary.cases.studies.optimise.checks import (
+from catenary.cases.studies.optimise.search import dropper_table, least_forces
+from catenary.cases.studies.optimise.study import (
     AS_IS,
     UNSEEN,
     Row,
@@ -30,13 +31,11 @@ from catenary.cases.studies.optimise.checks import (
     not_improved,
     unseen_direction,
 )
-from catenary.cases.studies.optimise.droppers import dropper_table, least_forces
-from catenary.cases.studies.optimise.task import OptimiseTask, VariableTable
-from catenary.cases.studies.optimise.variables import variables_of
+from catenary.cases.studies.optimise.task import OptimiseTask, VariableTable, variables_of
 from catenary.cases.studies.scene_sets import BROKE
 from catenary.cases.studies.task_files import read_task
+from catenary.cases.studies.tolerance.errors import ToleranceTask
 from catenary.cases.studies.tolerance.study import make_plan
-from catenary.cases.studies.tolerance.task import ToleranceTask
 
 SAG = [0.0, 10.0, 20.0, 30.0, 35.0, 30.0, 20.0, 10.0, 0.0]
 FORWARD = {"directions": ["forward"]}

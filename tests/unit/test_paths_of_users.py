@@ -11,7 +11,7 @@ from verb_runner import invoke
 
 from catenary import InputError
 from catenary import open as open_run
-from catenary.base import paths
+from catenary.base import files
 from catenary.cases.result_folder.output_folder import run_folder
 from catenary.postproc.files.disk import write_all
 
@@ -56,7 +56,7 @@ def test_a_folder_of_another_user_is_told(tmp_path: Path, monkeypatch: pytest.Mo
     told = r"/theirs cannot be looked up \(Permission denied\): ask the owner"
     with monkeypatch.context() as patch:
         patch.setattr(os, "stat", refuses)
-        for asks in (paths.is_file, paths.is_folder, paths.is_there, open_run):
+        for asks in (files.is_file, files.is_folder, files.is_there, open_run):
             with pytest.raises(InputError, match=told):
                 asks(tmp_path / "theirs")
         # Not by the parser of the option, whose errors nobody catches.
@@ -65,8 +65,8 @@ def test_a_folder_of_another_user_is_told(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_links_in_a_circle_name_nothing(tmp_path: Path) -> None:
     (tmp_path / "a").symlink_to("a")
-    assert not paths.is_there(tmp_path / "a") and not paths.is_file(Path("a\0b"))
-    assert paths.is_folder(tmp_path) and not paths.is_there(tmp_path / "a" / "b")
+    assert not files.is_there(tmp_path / "a") and not files.is_file(Path("a\0b"))
+    assert files.is_folder(tmp_path) and not files.is_there(tmp_path / "a" / "b")
 
 
 def test_folders_of_any_depth_are_made(tmp_path: Path) -> None:

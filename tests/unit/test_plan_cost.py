@@ -16,16 +16,17 @@ from verb_runner import invoke
 
 import catenary
 from catenary import InputError
-from catenary.cases.studies.effect_cost import output
-from catenary.cases.studies.effect_cost.step_timing import RepeatedMarch, beside
-from catenary.cases.studies.effect_cost.study import (
+from catenary.cases.studies import effect_cost
+from catenary.cases.studies.effect_cost import (
     UNSWITCHED,
     CostOptions,
     Costs,
     Measured,
+    RepeatedMarch,
     Size,
     Switch,
     SwitchableEffects,
+    beside,
     jobs_of,
     measure,
     switchable_effects,
@@ -106,7 +107,7 @@ def test_changes_are_those_of_two_runs(found: Costs) -> None:
         (own,) = figures
         assert own["std_N"] == summary["pantographs"][0]["std_N"]
         assert own["max_uplift_mm"] == summary["supports"]["max_uplift_mm"]
-    rows = {row["effect"]: row for row in output.table_of(found).records()}
+    rows = {row["effect"]: row for row in effect_cost.table_of(found).records()}
     for name, summary in zip(TWO, summaries[1:], strict=True):
         expected = summary["pantographs"][0]["max_N"] - summaries[0]["pantographs"][0]["max_N"]
         assert rows[name]["change_of_max_N"] == expected != 0.0
@@ -126,7 +127,7 @@ def test_counts_are_those_of_the_model() -> None:
                 assert march.step_cost() > 0.0
             assert size.n_unknowns == model.numbering.n_unknowns == sum(planes) // 2 * mesh.n_nodes
             assert size.planes == planes
-    assert output.width_text(size) == "4+2+2"
+    assert effect_cost.width_text(size) == "4+2+2"
 
 
 def test_a_march_goes_back_behind_an_incident() -> None:
@@ -184,13 +185,15 @@ def test_advice_weighs_cost_against_change() -> None:
         (off, 0.8, figures(None), "makes a step 0.80 times as long, and with it sigma comes or go"),
     ):  # fmt: skip
         row = Measured(switch, "done", size, ratio, after)
-        assert words in output.advice(costs_of(row, figures(30.0)), row)
+        assert words in effect_cost.advice(costs_of(row, figures(30.0)), row)
     broken = Measured(on, "at 3 s it broke.")
-    assert output.advice(costs_of(broken, figures(1.0)), broken).endswith("here: at 3 s it broke.")
+    assert effect_cost.advice(costs_of(broken, figures(1.0)), broken).endswith(
+        "here: at 3 s it broke."
+    )
 
 
 def test_table_csv_and_json_hold_the_same(found: Costs, tmp_path: Path) -> None:
-    files = write_files(tmp_path, output.files_of(found))
+    files = write_files(tmp_path, effect_cost.files_of(found))
     assert [path.name for path in files] == ["cost.csv", "cost.json", "cost.txt"]
     text, record = files[2].read_text(), json.loads(files[1].read_text())
     rows = list(csv.DictReader(files[0].read_text().splitlines()))
@@ -215,11 +218,11 @@ def test_the_text_of_a_file_does_not_depend_on_the_terminal(
     found: Costs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its table was cut to pieces as wide as the terminal of who wrote it."""
-    before = output.files_of(found)[output.TEXT]
-    assert before == output.as_text(found) + "\n"
+    before = effect_cost.files_of(found)[effect_cost.TEXT]
+    assert before == effect_cost.as_text(found) + "\n"
     monkeypatch.setattr(study_table, "terminal_width", lambda: 60)
-    assert output.files_of(found)[output.TEXT] == before
-    assert output.as_text(found) + "\n" != before
+    assert effect_cost.files_of(found)[effect_cost.TEXT] == before
+    assert effect_cost.as_text(found) + "\n" != before
 
 
 def test_an_effect_that_a_scene_refuses_to_leave_out_is_told() -> None:

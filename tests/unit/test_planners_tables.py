@@ -9,7 +9,7 @@ import pytest
 from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of, read_draft, recorded
 
 from catenary import InputError
-from catenary.cases.run.describe.arrivals import arrival_warnings
+from catenary.cases.run.arrivals import arrival_warnings
 from catenary.cases.scene.checks.mesh_size import size_of
 
 WITHOUT = (

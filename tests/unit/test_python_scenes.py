@@ -18,7 +18,7 @@ import xarray as xr
 from scenes import find_case, load_scene, resolved
 
 import catenary
-from catenary.cases.run.at_rest.static_table import check_line
+from catenary.cases.run.at_rest import check_line
 from catenary.scenes import checked
 
 CASE = "en50318_2002"
@@ -235,7 +235,7 @@ def test_tables_at_rest_are_those_of_the_line() -> None:
 
 
 def test_the_plan_is_that_of_the_command_line(scene: catenary.Scene) -> None:
-    from catenary.cases.run.planning.plan import make_plan, plan_text
+    from catenary.cases.run.plan import make_plan, plan_text
 
     own, plan = make_plan(load_scene(CASE)), catenary.plan(scene)
     assert str(plan) == plan_text(own)
@@ -291,16 +291,16 @@ def test_nothing_is_printed_unless_a_program_asks() -> None:
 def test_derivatives_at_rest_say_what_they_are_and_what_is_left_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from catenary.cases.studies.sensitivity import at_rest
+    from catenary.cases.studies.sensitivity import derivatives
 
-    own, tension = at_rest._derivative, "line.contact_wire.tension_N"
+    own, tension = derivatives._derivative, "line.contact_wire.tension_N"
 
     def derivative(parameter: Any, *rest: Any) -> np.ndarray:
         if parameter.key == tension:
             raise catenary.InputError("it makes a dropper slack")
         return own(parameter, *rest)
 
-    monkeypatch.setattr(at_rest, "_derivative", derivative)
+    monkeypatch.setattr(derivatives, "_derivative", derivative)
     found = catenary.static(catenary.load("tramway", short=True)).sensitivity()
     assert tension not in found.parameter
     assert found.attrs["left_out"] == [f"{tension}: it makes a dropper slack"]
@@ -315,16 +315,16 @@ def test_derivatives_at_rest_say_what_they_are_and_what_is_left_out(
 
 
 def test_derivatives_of_a_march_say_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    from catenary.cases.studies.sensitivity import study
+    from catenary.cases.studies.sensitivity import derivatives
 
-    own, tension = study.change_by, "line.contact_wire.tension_N"
+    own, tension = derivatives.change_by, "line.contact_wire.tension_N"
 
     def change_by(parameter: Any, *rest: Any) -> Any:
         if parameter.key == tension:
             raise catenary.InputError("it has none")
         return own(parameter, *rest)
 
-    monkeypatch.setattr(study, "change_by", change_by)
+    monkeypatch.setattr(derivatives, "change_by", change_by)
     table = catenary.sensitivity(catenary.load(CASE, short=True))
     assert tension not in set(table.parameter)
     assert table.attrs["left_out"] == [f"{tension}: it has none"]

@@ -17,21 +17,30 @@ from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.studies.reference import validation
-from catenary.cases.studies.reference.configurations import configurations, table
-from catenary.cases.studies.reference.convergence import (
+from catenary.cases.studies.reference.judgement import (
+    FAILED,
+    PASSED,
+    curve_through,
+    judged,
+    limits,
+    read_results,
+)
+from catenary.cases.studies.reference.solutions import (
+    DATA,
     FINEST,
     HISTORY,
     LINE,
     OF_FORCE,
+    PLACE,
     QUANTITIES,
     UPLIFT,
+    configurations,
     jobs_of,
+    read,
     run_name,
     statistics,
+    table,
 )
-from catenary.cases.studies.reference.judgement import FAILED, PASSED, judged, limits
-from catenary.cases.studies.reference.others_results import curve_through, read_results
-from catenary.cases.studies.reference.solutions import DATA, PLACE, read
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.variants import Variant
 

@@ -10,9 +10,7 @@ from pathlib import Path
 from scenes import read_draft
 
 from catenary.cases.scene.run.case import chosen_books
-from catenary.postproc.standards.book import book_of
-from catenary.postproc.standards.library import shipped
-from catenary.postproc.standards.quantities import LIMIT_KEYS, QUANTITIES
+from catenary.postproc.standards.rule_books import LIMIT_KEYS, QUANTITIES, book_of, shipped
 
 ROOT = Path(__file__).parents[2]
 GUIDE = (ROOT / "docs/guide/rules.md").read_text(encoding="utf-8")

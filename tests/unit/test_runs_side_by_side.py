@@ -17,7 +17,7 @@ from work_items import die_at_275, measure_steps
 
 import catenary
 from catenary import InputError
-from catenary.cases.run.planning.needs import Kept, total_size
+from catenary.cases.run.needs import Kept, total_size
 from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import table_of
 from catenary.cases.studies.sweep.run_jobs import run_jobs

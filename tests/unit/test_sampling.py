@@ -16,7 +16,7 @@ from scenes import Scene, line_of, load_scene, read_draft
 from scipy import stats
 
 from catenary import InputError
-from catenary.cases.scene.input.toml_input import parse_assignment
+from catenary.cases.scene.input.case_files import parse_assignment
 from catenary.cases.studies.sampling.samples import sample_name, samples
 from catenary.cases.studies.sampling.tables import SamplingTable, read_sampling, sampling_of
 from catenary.cases.studies.sweep.jobs import scene_of

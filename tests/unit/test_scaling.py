@@ -10,13 +10,13 @@ from program import MPIRUN, catenary
 from scenes import load_scene
 from verb_runner import invoke
 
-from catenary.cases.run.planning import many_ranks
-from catenary.cases.run.planning.many_ranks import Sizes, Wire, Work, march_on, predict
-from catenary.cases.run.planning.plan import make_plan
-from catenary.cases.scene.problem import problem_of
+from catenary.cases.run import cluster
+from catenary.cases.run.cluster import Sizes, Wire, Work, march_on, predict
+from catenary.cases.run.plan import make_plan
+from catenary.cases.scene.scene import problem_of
 from catenary.cases.studies import scaling
 from catenary.cases.studies.scaling import as_text
-from catenary.solver.contact.line_response import LineResponse
+from catenary.solver.contact.responses import LineResponse
 from catenary.solver.contact_problem.force_exchange import Exchange
 from catenary.solver.kernels import native
 
@@ -31,7 +31,7 @@ def test_a_step_on_many_ranks_is_the_line_shared_out_and_messages() -> None:
     assert found.neighbours == pytest.approx(2 * (2e-6 + 800e-10))
     assert found.tree == pytest.approx(6 * (4e-6 + 616e-10))
     assert found.step == pytest.approx(
-        found.line + found.neighbours + found.tree + 20e-6 + many_ranks._ONE_BY_ONE
+        found.line + found.neighbours + found.tree + 20e-6 + cluster._ONE_BY_ONE
     )
     alone = predict(WORK, WIRE, 1)
     assert alone.step == pytest.approx(WORK.step) and alone.messages == 0.0
@@ -41,7 +41,7 @@ def test_messages_are_as_long_as_those_of_a_march() -> None:
     """Of the exchange of a step with one contact and with two."""
     for n, more in ((1, ""), (2, ",{name='lumped',behind_m=30}")):
         words = [f"train.pantographs=[{{name='lumped'}}{more}]", "train.start_m=200"]
-        sizes = many_ranks.work_of(load_scene("ambrosio2012", words)).sizes
+        sizes = cluster.work_of(load_scene("ambrosio2012", words)).sizes
         bounds = native.Bounds(*LineResponse(n, 1).bounds)
         exchange = Exchange(MPI.COMM_SELF, n, False, bounds)
         assert sizes.share == exchange.share.summed.nbytes

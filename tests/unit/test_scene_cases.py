@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scenes import line_data_of, load_scene, mesh_of, problem_of, shipped
 
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 def reference(case: str, name: str) -> list[dict[str, str]]:

@@ -8,20 +8,21 @@ import pytest
 from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of, recorded, with_words
 
 import catenary
-from catenary.cases.run.describe.defects import defect_facts
-from catenary.meshgen.hardware import Fittings
-from catenary.meshgen.line import DropperPlace
+from catenary.cases.run.description import defect_facts
+from catenary.meshgen.line import DropperPlace, Fittings
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.effects import all_effects
 from catenary.solver.problem.defects import (
     HardSpot,
+    Heights,
+    HeightSpectrum,
     Kink,
+    LengthErrors,
     LooseClamp,
     MissingDropper,
     WornWire,
     WrongTension,
 )
-from catenary.solver.problem.irregularities import Heights, HeightSpectrum, LengthErrors
 
 KINDS = ("missing_dropper", "loose_clamp", "worn_wire", "wrong_tension", "hard_spot", "kink")
 DEFECTS = (

@@ -11,7 +11,7 @@ import pytest
 from scenes import Scene, load_scene, problem_of, resolved, scene_from
 
 from catenary import InputError
-from catenary.cases.run.planning.plan import effect_rows
+from catenary.cases.run.plan import effect_rows
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.solver.effects import all_effects as effects

@@ -9,7 +9,7 @@ from scenes import load_scene, problem_of, with_words
 
 import catenary
 from catenary import InputError
-from catenary.cases.run.describe.arrivals import arrival_facts
+from catenary.cases.run.arrivals import arrival_facts
 from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 
 END = "line.ends.end"

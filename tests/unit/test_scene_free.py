@@ -13,8 +13,8 @@ from free_tables import as_free
 from measuring import march
 from scenes import Scene, line_of, load_scene, mesh_of, problem_of, resolved, scene_from
 
+from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.input.faults import Origin, SceneError
-from catenary.cases.scene.input.toml_input import read_toml
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import End, Role
 from catenary.solver.statics.line_at_rest import line_at_rest

@@ -12,11 +12,10 @@ from scenes import Scene, load_scene, problem_of, recorded, resolved, scene_from
 from catenary import InputError
 from catenary.cases.scene.checks.scene import MIN_SEPARATION
 from catenary.cases.scene.input.faults import Origin
-from catenary.cases.scene.problem import end_of
+from catenary.cases.scene.scene import end_of
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
-from catenary.mbs.vehicle.base_motion import Harmonic, Table, VehicleMotion
-from catenary.mbs.vehicle.irregularity import Irregularity
+from catenary.mbs.vehicle import Harmonic, Irregularity, Table, VehicleMotion
 
 CASE = "ac_simple"
 KIND = "pantographs.three_masses"

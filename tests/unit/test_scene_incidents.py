@@ -8,13 +8,13 @@ from scenes import Scene, load_scene, problem_of, recorded, with_words
 
 import catenary
 from catenary import InputError
-from catenary.cases.run.describe.defects import incident_facts
+from catenary.cases.run.description import incident_facts
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.mbs.lowering import Lowering
 from catenary.meshgen.line import DropperPlace
-from catenary.solver.problem.incidents import DropperBreak, TensionLoss
-from catenary.solver.statics.changed_line.rest_with_defects import errors_of_length
+from catenary.solver.problem.defects import DropperBreak, TensionLoss
 from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.statics.rest_nearby import errors_of_length
 
 INCIDENTS = (
     "incidents=[{type='lowering',at_s=3.0004,force_N=-75.0,drop_m=0.25},"

@@ -8,8 +8,8 @@ from free_tables import as_free
 from scenes import line_data_of, load_scene, problem_of, scene_from
 
 from catenary import InputError
-from catenary.cases.run.at_rest.static_table import static_table
-from catenary.cases.run.planning.plan import effect_rows
+from catenary.cases.run.at_rest import static_table
+from catenary.cases.run.plan import effect_rows
 from catenary.cases.scene.input.faults import Origin
 from catenary.solver.effects.all_effects import active
 

@@ -6,9 +6,8 @@ import pytest
 from scenes import Scene, load_scene, problem_of, recorded
 
 from catenary import InputError
-from catenary.cases.run.describe.pantographs import kind_lines
-from catenary.mbs.control import Regulation
-from catenary.mbs.head.laws import Law
+from catenary.cases.run.description import kind_lines
+from catenary.mbs.head.laws import Law, Regulation
 from catenary.solver.effects import all_effects as effects
 
 CASE, KIND = "en50318_2002", "pantographs.reference"

@@ -21,7 +21,7 @@ from scenes import (
 from catenary import InputError
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.units import unit_of
-from catenary.cases.scene.problem import end_of
+from catenary.cases.scene.scene import end_of
 
 # Keys that other programs rely on.
 CONTRACT = [

@@ -8,7 +8,7 @@ from scenes import Scene, load_scene, problem_of, recorded, resolved, with_words
 
 import catenary
 from catenary import InputError, RunBroken
-from catenary.cases.scene.cost_model import estimate_march
+from catenary.cases.scene.checks.mesh_size import estimate_march
 from catenary.mbs.build import has_joints
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped_data import LumpedData

@@ -10,9 +10,9 @@ from scenes import line_of, load_scene, mesh_of, problem_of
 from catenary.cases.scene.input.faults import SceneError
 from catenary.meshgen.wires import Role
 from catenary.solver.model.switching_links import switching_links
-from catenary.solver.problem.incidents import TensionLoss
+from catenary.solver.problem.defects import TensionLoss
 from catenary.solver.problem.watched_links import UPLIFT_STOPS
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 CASES = ("ac_simple", "re330_stitched", "shinkansen_compound", "dc_twin", "tramway")
 # What befalls a single part moves twin wires relative to each other.

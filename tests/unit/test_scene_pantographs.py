@@ -12,11 +12,11 @@ from measuring import check
 from paper_pantograph import corrections, data, number_at, table
 from scenes import Scene, load_scene, problem_of
 
-from catenary.cases.run.describe.pantographs import header_words, kind_lines
+from catenary.cases.run.description import header_words, kind_lines
 from catenary.cases.scene.checks.pantographs import check_pantographs
-from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.keys.keys import is_known, known_keys
-from catenary.cases.scene.problem import static_force
+from catenary.cases.scene.scene import static_force
 from catenary.cases.scene.train.multibody import multibody_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.cases.terminal.lists import key_table

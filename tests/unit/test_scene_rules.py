@@ -12,7 +12,7 @@ from verb_runner import invoke
 from catenary import InputError
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.run.case import LimitsTable, chosen_books, rule_entries
-from catenary.postproc.standards.quantities import LIMIT_KEYS
+from catenary.postproc.standards.rule_books import LIMIT_KEYS
 
 CASE = "en50318_2002"
 OWN = """name = "mine"

@@ -9,7 +9,7 @@ import pytest
 from measuring import check
 from scenes import line_of, load_scene, mesh_of, problem_of
 
-from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.run.at_rest import static_table
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.terminal.terminal_text import static_text
 from catenary.meshgen.wires import Role

@@ -7,14 +7,14 @@ from scenes import load_scene, mesh_of, problem_of, with_words
 
 import catenary
 from catenary import InputError
-from catenary.cases.run.planning.needs import needs_before_meshing
+from catenary.cases.run.needs import needs_before_meshing
 from catenary.cases.scene.checks.effects import needs_relative_motion
 from catenary.cases.scene.checks.mesh_size import size_of
 from catenary.cases.scene.input.faults import SceneError
 from catenary.cases.studies.accuracy.axes import planes
 from catenary.cases.studies.asked import Excited
-from catenary.cases.studies.effect_cost.study import switchable_effects
-from catenary.cases.studies.waves.excited import excitation_of
+from catenary.cases.studies.effect_cost import switchable_effects
+from catenary.cases.studies.waves.study import excitation_of
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 

@@ -6,7 +6,7 @@ import pytest
 from scenes import load_scene, problem_of
 
 from catenary import InputError
-from catenary.cases.run.describe.pantographs import kind_lines
+from catenary.cases.run.description import kind_lines
 from catenary.solver.effects.all_effects import active
 
 CALM = "wind.speed_m_per_s=0"

@@ -19,10 +19,15 @@ from scenes import load_scene, mesh_of, problem_of
 from catenary import InputError
 from catenary.cases.run.prepared import rest_of, sound_rest
 from catenary.cases.scene.load import recorded_scene
-from catenary.cases.scene.problem import resolved
-from catenary.cases.studies.sensitivity.output import as_text, table_of
+from catenary.cases.scene.scene import resolved
+from catenary.cases.studies.sensitivity.derivatives import (
+    Sensitivity,
+    as_text,
+    change_by,
+    sensitivity_of,
+    table_of,
+)
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
-from catenary.cases.studies.sensitivity.study import Sensitivity, change_by, sensitivity_of
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.tangents.march import march_with_tangents

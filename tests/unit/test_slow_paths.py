@@ -14,8 +14,8 @@ from scenes import problem_of as problem_of_scene
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 import catenary
-from catenary.cases.run.planning.needs import needs_with_mesh
-from catenary.cases.scene.cost_model import (
+from catenary.cases.run.needs import needs_with_mesh
+from catenary.cases.scene.checks.mesh_size import (
     SEVERAL_TYPES,
     STATION_COST,
     STEP_OVERHEAD,

@@ -11,7 +11,7 @@ from measuring import check
 from scenes import load_scene
 from verb_runner import invoke
 
-from catenary.cases.run.at_rest.static_table import rest_text, static_table
+from catenary.cases.run.at_rest import rest_text, static_table
 
 SHORT = ["line.n_spans=5", "train.start_m=60", "evaluation.from_m=110", "evaluation.to_m=165"]
 RUN = [word for change in SHORT for word in ("--set", change)]

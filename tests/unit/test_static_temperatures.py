@@ -12,11 +12,10 @@ from scenes import load_scene
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.run.at_rest.static_table import check_line
-from catenary.cases.run.at_rest.temperatures import range_of, temperature_text
+from catenary.cases.run.at_rest import check_line, range_of, temperature_text
 from catenary.postproc.report.pictures.line_pictures import draw_temperatures
-from catenary.solver.model.wire_ends import WireEnd
-from catenary.solver.statics.tension_along import LineAtTemperature, WireAtRest
+from catenary.solver.model.axial_motion import WireEnd
+from catenary.solver.statics.line_at_rest import LineAtTemperature, WireAtRest
 
 SCENE = [
     "line.n_spans=12",

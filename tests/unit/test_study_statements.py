@@ -12,7 +12,7 @@ from small_lines import BARE, bare_wires, mesh_of, problem_of
 
 from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE
-from catenary.cases.studies.paper import conclusion, statements
+from catenary.cases.studies.paper import conclusion
 from catenary.cases.studies.paper.runs import PaperStudy, Rows
 from catenary.cases.studies.waves.theory import first_band
 from catenary.postproc.report.study_report import NOT_REPRODUCED, REPRODUCED, UNDECIDED
@@ -21,7 +21,7 @@ from catenary.solver.effects.build_model import build
 LIGHT, AVERAGE = "light", "average"
 TRAINS = ("single", "31m", "85m", "200m")
 PAPER = PaperStudy.read(TABLE)
-STATEMENTS = statements.statements_of(PAPER.table)
+STATEMENTS = conclusion.statements_of(PAPER.table)
 Runs = dict[tuple[str, str], list[dict[str, Any]] | None]
 
 
@@ -54,7 +54,7 @@ def as_the_paper_says() -> Runs:
 
 
 def findings(runs: Runs) -> list[Any]:
-    return statements.judge(STATEMENTS, Rows.of(runs))
+    return conclusion.judge(STATEMENTS, Rows.of(runs))
 
 
 def verdicts(runs: Runs) -> list[str]:
@@ -142,7 +142,7 @@ def test_only_the_separations_of_the_text_may_be_judged() -> None:
     runs = changed(AVERAGE, "85m", 1, std_N=80.0, max_N=400.0)
     assert PAPER.named_trains == ["single", "31m", "200m"]
     assert verdicts(runs)[1:3] == [NOT_REPRODUCED] * 2
-    named = statements.judge(STATEMENTS, Rows.of(runs).only(PAPER.named_trains))
+    named = conclusion.judge(STATEMENTS, Rows.of(runs).only(PAPER.named_trains))
     assert [one.verdict for one in named][1:3] == [REPRODUCED] * 2
 
 
@@ -154,7 +154,7 @@ def test_only_the_separations_of_the_text_may_be_judged() -> None:
 def test_a_wrong_condition_is_told(condition: dict[str, Any], says: str) -> None:
     table = {"statements": [{"says": "A.", "criterion": "B", "conditions": [condition]}]}
     with pytest.raises(InputError, match=says):
-        statements.statements_of(table)
+        conclusion.statements_of(table)
 
 
 def single(light: float, average: float | None) -> Rows:

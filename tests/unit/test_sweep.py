@@ -20,7 +20,7 @@ import catenary
 from catenary import InputError
 from catenary.cases.result_folder import output_folder
 from catenary.cases.result_folder.folder_lock import FolderLock
-from catenary.cases.run.planning.needs import needs_before_meshing
+from catenary.cases.run.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
 from catenary.cases.studies.merged_sweeps import merge
 from catenary.cases.studies.records import read_record

@@ -22,9 +22,9 @@ from catenary.cases.scene.load import Draft
 from catenary.cases.studies import merged_sweeps
 from catenary.cases.studies.planned_sweep import plan_sweep
 from catenary.cases.studies.records import FOLDER
-from catenary.cases.studies.sweep.force_histograms import force_histograms
 from catenary.cases.studies.sweep.histories import KeptHistories
 from catenary.cases.studies.sweep.jobs import AS_USUAL, HISTORIES, Ended, Part
+from catenary.cases.studies.sweep.output import force_histograms
 from catenary.cases.studies.sweep.together import pieces_of_work
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
 

@@ -14,15 +14,25 @@ from scenes import TINY, Scene, line_of, read_draft
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.run.at_rest import static_table
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies import scene_sets
 from catenary.cases.studies.scene_sets import BROKE, BoundTable
 from catenary.cases.studies.task_files import read_task
-from catenary.cases.studies.tolerance.errors import Group, groups_of
-from catenary.cases.studies.tolerance.output import as_text, installer_table
-from catenary.cases.studies.tolerance.pictures import draw_shares, draw_values
-from catenary.cases.studies.tolerance.samples import Bound, samples_of
+from catenary.cases.studies.tolerance.errors import (
+    Bound,
+    Group,
+    SamplesTable,
+    ToleranceTask,
+    groups_of,
+    samples_of,
+)
+from catenary.cases.studies.tolerance.output import (
+    as_text,
+    draw_shares,
+    draw_values,
+    installer_table,
+)
 from catenary.cases.studies.tolerance.study import (
     ALL,
     EACH,
@@ -32,7 +42,6 @@ from catenary.cases.studies.tolerance.study import (
     make_plan,
     margins_of,
 )
-from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 DROPPERS = {"name": "droppers", "kind": "dropper_lengths", "level": 5.0, "most": 20.0}

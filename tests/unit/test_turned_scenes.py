@@ -9,7 +9,7 @@ import pytest
 from scenes import Scene, line_of, load_scene, resolved
 
 from catenary import InputError
-from catenary.cases.run.at_rest.static_table import static_table
+from catenary.cases.run.at_rest import static_table
 from catenary.cases.scene.turned import has_mirrored_line, turned
 
 # Spans of two lengths in an order of their own, droppers that are no mirror image of themselves.

@@ -18,13 +18,12 @@ from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.output import files_of, table_of
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.cases.studies.uncertainty import output
-from catenary.cases.studies.uncertainty.evaluation import evaluate, failing
+from catenary.cases.studies.uncertainty.evaluation import evaluate, failing, indices
 from catenary.cases.studies.uncertainty.run_table import (
     SAMPLING,
     read_run_table,
     run_table,
 )
-from catenary.cases.studies.uncertainty.sensitivity import indices
 from catenary.postproc.report.study_table import write_files
 
 pytestmark = pytest.mark.usefixtures("quick_reports")

@@ -10,10 +10,10 @@ import pytest
 from measuring import check
 from scenes import load_scene, problem_of
 
-from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
-from catenary.cases.run.describe.wave_arrivals import (
+from catenary.cases.run.arrivals import (
     Course,
     WaveLine,
+    arrival_facts,
     arrivals,
     end_for,
     far_share,
@@ -21,6 +21,7 @@ from catenary.cases.run.describe.wave_arrivals import (
     reflection_felt,
     run_in_for,
     start_share,
+    wave_line,
 )
 
 # One string, 1000 m, waves of 100 m/s.

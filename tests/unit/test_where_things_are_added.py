@@ -28,9 +28,8 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.link_directions import between_nodes
 from catenary.solver.model.links import law
 from catenary.solver.model.matrices import whole_matrix
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.problem.problem import Problem, Simulated
+from catenary.solver.statics.form_finding import find_form
 
 STIFFNESS = 1.5e4  # [N/m]
 NAME = "spare_link"

@@ -15,17 +15,22 @@ import pytest
 import verb_runner
 from scenes import find_case, load_scene, mesh_of, problem_of
 
-from catenary.cases.studies.questions import causes, worst_output
-from catenary.cases.studies.questions.causes import Causes, elasticity_along, gust_forces
-from catenary.cases.studies.questions.worst import Passage, stands_out, worst_places
+from catenary.cases.studies.questions import worst
+from catenary.cases.studies.questions.worst import (
+    Causes,
+    Passage,
+    elasticity_along,
+    gust_forces,
+    stands_out,
+    worst_places,
+)
 from catenary.postproc.evaluate.observations import observe
 from catenary.postproc.evaluate.statistics import contact_statistics, evaluate
 from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.read.results import Results
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest
-from catenary.solver.wind.gust_field import GustField
-from catenary.solver.wind.spectra import UPWARD
+from catenary.solver.wind import UPWARD, GustField
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 
@@ -149,7 +154,7 @@ def test_places_that_no_pantograph_has_reached_are_left_out(
         file[COMPLETE][...] = [rows, 0, rows]
     with Results(tmp_path) as results:
         places = worst_places(results)
-        text, _ = worst_output.answer_of(results, 3)
+        text, _ = worst.answer_of(results, 3)
     assert "The record ends with the last pantograph at 800 m: supports and" in text
     # Spans of 60 m: the last mast before 800 m is at 780 m.
     assert max(one.x for one in places.arms) == pytest.approx(780.0)
@@ -173,9 +178,9 @@ def test_a_span_at_whose_end_the_record_ends_within_a_step_is_whole(
         assert [one.span for one in sorted(worst_places(results).passages)] == [6, 7]
         # Gusts are looked at until the mast is passed, or to the last record before it.
         seen: list[list[tuple[float, ...]]] = []
-        monkeypatch.setattr(causes, "gust_forces", lambda rest, when: seen.append(when) or [])
+        monkeypatch.setattr(worst, "gust_forces", lambda rest, when: seen.append(when) or [])
         rest: Any = object()
-        monkeypatch.setattr(causes, "elasticity_along", lambda *_: None)
+        monkeypatch.setattr(worst, "elasticity_along", lambda *_: None)
         Causes(results, worst_places(results).passages, rest)._gust_forces  # noqa: B018
         assert max(when[3] for when in seen[0]) == results.time[-1]
 
@@ -246,10 +251,10 @@ def test_candidates_are_explained_where_there_are_some(
 ) -> None:
     """The sentence about candidates stood below places without any."""
     with Results(run_folder) as results:
-        assert worst_output.answer_of(results, 3)[0].endswith("none is proved.")
+        assert worst.answer_of(results, 3)[0].endswith("none is proved.")
         for name in ("of_line", "of_passage", "at"):
             monkeypatch.setattr(Causes, name, lambda *_: [])
-        text, _ = worst_output.answer_of(results, 3)
+        text, _ = worst.answer_of(results, 3)
     assert "Spans by standard deviation" in text and "none is proved" not in text
 
 
@@ -308,7 +313,7 @@ def test_force_of_gusts_on_a_span() -> None:
 
 def test_without_gusts_none_press_and_what_is_like_the_others_needs_no_cause() -> None:
     assert gust_forces(at_rest("windy_viaduct", "effects.gusts=false"), [(605, 660, 0, 9)]) == []
-    of = worst_output._with_candidates
+    of = worst._with_candidates
     assert of("5 m", True, []) == ("5 m; stands out", ["no cause found"])
     assert of("5 m", True, ["a mass"])[1] == ["a mass"]
     assert of("5 m", False, [])[1] == of("5 m", None, [])[1] == []

@@ -12,7 +12,7 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
-from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.problem.defects import DropperBreak
 from catenary.solver.problem.problem import Numerics, Problem
 
 DT = 1e-3

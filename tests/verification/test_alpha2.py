@@ -30,7 +30,7 @@ from ts_alpha2 import TS_ALPHA2
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 NOMINAL_HEIGHT = 5.52
 START, SPEED = 43.0, 80.0

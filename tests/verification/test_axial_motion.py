@@ -50,7 +50,7 @@ from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AlongTrack, Tensioner
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 EPS = np.finfo(float).eps
 STRAIGHT = BARE | AXIAL

@@ -15,18 +15,24 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from variable_steps import integrate
 
 from catenary.mbs.build import raising_data
-from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.head.wire_crossing import LateralPath
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.rigid.bodies import Law
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, Fixed, PrescribedPoint, Prismatic
-from catenary.mbs.rigid.kinematics import Law
 from catenary.mbs.rigid.statics import equilibrium
-from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, Table, VehicleMotion
-from catenary.mbs.vehicle.irregularity import SPECTRA, Irregularity, Spectrum
+from catenary.mbs.vehicle import (
+    SPECTRA,
+    BaseMotion,
+    Harmonic,
+    Irregularity,
+    Spectrum,
+    Table,
+    VehicleMotion,
+)
 
 SHORTEST, LONGEST = 3.0, 100.0
 

@@ -15,7 +15,7 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
 from catenary.solver.model.loads import FieldLoad
 from catenary.solver.problem.wind import Gusts, Stretch, Wind
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 BLOWN = frozenset({"lateral_motion", "wind"})
 # Span [m], speed [m/s], loads of contact and messenger wire [N/m], stagger [m], tensions [N], and

@@ -16,9 +16,8 @@ from dense_line import DenseLine
 from measuring import History, check, march
 from small_lines import WHOLE, mesh_of, numerics, train
 
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
@@ -27,7 +26,7 @@ from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 @pytest.mark.parametrize("way", ["implicit", "iterated", "fixed_point"])

@@ -13,8 +13,8 @@ from small_lines import BARE, EN_CONTACT_WIRE, bare_wires, mesh_of, numerics, pr
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.wires import worn_round
 from catenary.solver.problem.defects import Defect, HardSpot, WornWire
-from catenary.solver.statics.form_finding.equilibrium import find_form
-from catenary.solver.waves.scattering import change_of_wire, scattered
+from catenary.solver.statics.form_finding import find_form
+from catenary.solver.waves.reflection import change_of_wire, scattered
 
 HZ = np.array([2.0, 5.0, 10.0, 15.0, 20.0])
 OMEGA = 2 * np.pi * HZ

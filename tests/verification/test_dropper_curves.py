@@ -20,8 +20,7 @@ from scipy import integrate, optimize
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 from studies import few
 
-from catenary.meshgen.hardware import DropperKind
-from catenary.meshgen.line import DropperPlace
+from catenary.meshgen.line import DropperKind, DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.kernels import native
@@ -29,7 +28,7 @@ from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.defects import LooseClamp
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding import Equilibrium, find_form
 
 # At rest droppers of the line below carry 125 to 167 N. Of these curves the first stiffens step by
 # step, as ropes do; the second is softer to both sides of rest, and stiffer again beyond.

@@ -23,7 +23,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.build_model import build
 from catenary.solver.statics import elasticity as lifts
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 def test_lift_of_a_single_wire_is_that_of_a_tensioned_beam() -> None:

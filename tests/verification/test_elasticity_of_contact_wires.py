@@ -18,7 +18,7 @@ from catenary.solver.contact.pantographs import nominal_height_rule
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding import Equilibrium, find_form
 
 
 def at_rest(line: Line) -> tuple[Model, Equilibrium]:

@@ -13,11 +13,11 @@ from stitched_line import stitched_line
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.effects.build_model import build
-from catenary.solver.ends.line_beyond import END, START
+from catenary.solver.ends import END, START
 from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Fixed, Periodic
 from catenary.solver.problem.problem import Damping
-from catenary.solver.waves.end_reflection import EndReflection, end_reflection
+from catenary.solver.waves.reflection import EndReflection, end_reflection
 
 ENDS = {"periodic_ends", "absorbing_layers", "arm_stiffness"}
 # Waves of these outrun a train at 250 km/h.

@@ -14,7 +14,7 @@ from small_lines import HANGING, en50318_line, mesh_of, problem_of
 from swinging_train import swinging_train
 
 from catenary.solver.model.matrices import stiffness_matrix
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 EPS = np.finfo(float).eps
 

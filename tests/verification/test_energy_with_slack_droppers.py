@@ -18,7 +18,7 @@ from swinging_train import swinging_train
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.model.beam import shape_values
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 def test_energy_is_conserved_to_second_order_when_droppers_slacken() -> None:

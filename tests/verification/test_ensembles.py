@@ -15,15 +15,14 @@ from scenes import Scene, mesh_of, problem_of, read_draft
 
 import catenary
 from catenary import InputError
-from catenary.base.lone_process import alone
+from catenary.base.process import alone
 from catenary.cases.run.prepared import sound_rest
-from catenary.cases.scene.input.toml_input import REMOVED
+from catenary.cases.scene.input.case_files import REMOVED
 from catenary.cases.studies import ensemble as scenes_on_lines
 from catenary.cases.studies.ensemble import Marched, Marches
 from catenary.cases.studies.scene_sets import pieces_of
-from catenary.solver.ensemble import marches, shared_line
-from catenary.solver.ensemble.marches import SceneHistory, march_side_by_side
-from catenary.solver.ensemble.shared_line import SharedLine
+from catenary.solver import ensemble
+from catenary.solver.ensemble import SceneHistory, SharedLine, march_side_by_side
 from catenary.solver.kernels import native
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
@@ -158,7 +157,7 @@ def test_any_number_of_lanes_gives_the_same_motions(monkeypatch: pytest.MonkeyPa
         numbers = passes.scenes_at_once
     found = []
     for n in numbers:
-        monkeypatch.setattr(shared_line, "_quickest", lambda *_, n=n: n)
+        monkeypatch.setattr(ensemble, "_quickest", lambda *_, n=n: n)
         shared = SharedLine(at_rest, (-1e9, 1e9), n)
         assert len(shared.lanes) == n
         [own] = march_side_by_side(shared, [(0, at_rest)])
@@ -248,7 +247,7 @@ def test_pantographs_that_python_steps_march_one_by_one(monkeypatch: pytest.Monk
         refused.append(type(model).__name__)
         raise InputError("a pantograph has all its bodies in the time loop, which Python steps")
 
-    monkeypatch.setattr(marches, "stepped_by_kernels", refuse)
+    monkeypatch.setattr(ensemble, "stepped_by_kernels", refuse)
     changes = [{"train.speed_km_h": 240.0}, {"train.speed_km_h": 250.0}]
     found, _ = marched(scenes_of("en50318_2002", changes))
     assert len(refused) == 2 and [one.outcome for one in found] == ["done"] * 2

@@ -20,7 +20,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.solver.model.beam import shape_slopes, shape_values
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Problem, Train
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 EPS = np.finfo(float).eps
 

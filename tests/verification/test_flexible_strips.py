@@ -11,7 +11,7 @@ from measuring import check
 from scipy import linalg
 from scipy.integrate import simpson
 
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import (
     Flexure,
     HeadParts,
@@ -21,10 +21,9 @@ from catenary.mbs.head.strips import (
     mode_tables,
     shapes,
 )
-from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
-from catenary.mbs.response.frequency_response import head_response
+from catenary.mbs.response import head_response
 
 # A carbon strip on its aluminium holder: 1.1 m, 3 kg, EI of some hundreds.
 LENGTH, MASS, EI, SPRING, APART = 1.1, 3.0, 600.0, 8000.0, 0.7

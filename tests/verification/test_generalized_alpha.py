@@ -37,7 +37,7 @@ from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.integrator_parameters import integration_of
 from catenary.solver.problem.problem import Damping, Numerics
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 METHODS = [
     ("generalized_alpha", 1.0),

@@ -11,9 +11,16 @@ from scipy.integrate import quad
 
 from catenary.mbs.air import Tunnel
 from catenary.solver.problem.wind import Gusts, Profile, Stretch, Wind, friction_velocity_of
-from catenary.solver.wind.gust_field import POSTS, GustField
-from catenary.solver.wind.spectra import ACROSS, ALONG, UPWARD, variance_below
-from catenary.solver.wind.wind_at import exposure, wind_at
+from catenary.solver.wind import (
+    ACROSS,
+    ALONG,
+    POSTS,
+    UPWARD,
+    GustField,
+    exposure,
+    variance_below,
+    wind_at,
+)
 
 # As strong as the wind at 10 m, so that Davenport's U10 is the mean.
 WIND = Wind(

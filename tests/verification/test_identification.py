@@ -18,13 +18,11 @@ from scenes import Scene, load_scene, problem_of
 from scipy import stats
 from twin_passages import filtered_noise, write_measurement
 
-from catenary.cases.studies.identification.fitted_march import FittedMarch
-from catenary.cases.studies.identification.measurement import Measurement
+from catenary.cases.studies.identification.measurement import Measurement, Task
 from catenary.cases.studies.identification.output import as_text, verdict
 from catenary.cases.studies.identification.posterior import innovations_of, judge, posterior_of
-from catenary.cases.studies.identification.study import Identification, identify
-from catenary.cases.studies.identification.task import Task
-from catenary.cases.studies.measured.passages import read_table
+from catenary.cases.studies.identification.study import FittedMarch, Identification, identify
+from catenary.cases.studies.measured import read_table
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
 from catenary.cases.studies.task_files import read_task
 

@@ -37,7 +37,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.solver.model.beam import shape_slopes
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
-from catenary.solver.problem.incidents import (
+from catenary.solver.problem.defects import (
     DropperBreak,
     Happened,
     LineIncident,
@@ -45,8 +45,8 @@ from catenary.solver.problem.incidents import (
     in_steps,
 )
 from catenary.solver.problem.problem import Damping, Problem, Train
-from catenary.solver.statics.changed_line.after_incidents import changed_line
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.after_incidents import changed_line
+from catenary.solver.statics.form_finding import find_form
 from catenary.solver.statics.line_at_rest import line_at_rest
 
 EPS = np.finfo(float).eps

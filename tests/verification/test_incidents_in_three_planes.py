@@ -14,11 +14,11 @@ from spatial_line import SpatialLine, shape
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.ends import AlongTrack
-from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.changed_line.after_incidents import changed_line
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.after_incidents import changed_line
+from catenary.solver.statics.form_finding import find_form
 
 INCIDENTS = {"dropper_break", "tension_loss"}
 LATERAL = WHOLE | INCIDENTS | {"lateral_motion"}

@@ -22,8 +22,8 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
-from catenary.solver.wind.drag import along
+from catenary.solver.statics.form_finding import find_form
+from catenary.solver.wind import along
 
 NAME = "lateral_wind"
 PLANE = ("v", "theta_z")

@@ -16,15 +16,14 @@ from small_lines import HANGING, ac_simple_line, mesh_of, numerics, problem_of, 
 
 from catenary import InputError
 from catenary.solver.effects.build_model import build
-from catenary.solver.ends.half_lines import chain_at, half_lines
-from catenary.solver.ends.line_beyond import END, START, span_between
+from catenary.solver.ends import END, START, chain_at, half_lines, span_between
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium, LateralShape
 from catenary.solver.problem.ends import EndCondition, Fixed, Periodic
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
-from catenary.solver.waves.end_reflection import end_reflection
+from catenary.solver.statics.form_finding import find_form
+from catenary.solver.waves.reflection import end_reflection
 
 STEPS, DT, SPAN, SHORT, BESIDE = 500, 2e-3, 55.0, 4, 3
 EFFECTS = HANGING | {"lateral_motion", "structural_damping", "periodic_ends"}

@@ -15,14 +15,13 @@ from scipy import optimize
 from small_lines import HANGING, ac_simple_line, bare_wires, en50318_line, mesh_of, problem_of
 
 from catenary import InputError
-from catenary.meshgen.hardware import DropperKind, SteadyArm
+from catenary.meshgen.line import Curve, DropperKind, SteadyArm
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.track import Curve
 from catenary.meshgen.wires import Conductor
 from catenary.solver.model.rest_shape import LateralShape
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding import Equilibrium, find_form
 
 # Of an element, what it takes off a chord at a kink.
 ROUNDED = 0.12

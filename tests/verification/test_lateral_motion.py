@@ -28,8 +28,8 @@ from small_lines import (
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.wires import Conductor
-from catenary.solver.statics.form_finding.equilibrium import find_form
-from catenary.solver.wind.drag import along
+from catenary.solver.statics.form_finding import find_form
+from catenary.solver.wind import along
 
 LATERAL = frozenset({"lateral_motion"})
 EPS = np.finfo(float).eps

@@ -11,12 +11,12 @@ from measuring import History, check, start_march
 from small_lines import EN_PANTOGRAPH, WHOLE, ac_simple_line, mesh_of, problem_of, train
 
 from catenary.mbs.head.strips import Strips, Turning
-from catenary.mbs.vehicle.base_motion import Harmonic, VehicleMotion
+from catenary.mbs.vehicle import Harmonic, VehicleMotion
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.link_directions import at_places
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 
 LATERAL = frozenset({"lateral_motion"})

@@ -23,14 +23,16 @@ from catenary.solver.model.model import Model
 from catenary.solver.problem.defects import (
     Defect,
     HardSpot,
+    Heights,
+    Irregularities,
+    LengthErrors,
     LooseClamp,
     MissingDropper,
     WornWire,
     WrongTension,
 )
-from catenary.solver.problem.irregularities import Heights, Irregularities, LengthErrors
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding import Equilibrium, find_form
 
 SLACKENING = frozenset({"dropper_slackening"})
 EFFECTS = frozenset(

@@ -36,7 +36,7 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.link_directions import at_nodes
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, PUSHES, Bends, law
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView

@@ -13,7 +13,7 @@ from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.link_directions import at_nodes
 from catenary.solver.model.links import law
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 PULL, PLACE = 80.0, 86.75
 

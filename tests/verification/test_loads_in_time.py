@@ -29,7 +29,7 @@ from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FieldLoad, ShapeLoad, constant, harmonics, table
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.wind.drag import along
+from catenary.solver.wind import along
 
 DENSITY, SPEED = EN_CONTACT_WIRE.mass_per_length, EN_CONTACT_WIRE.wave_speed
 PLANE = ("w", "theta_y")

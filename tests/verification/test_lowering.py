@@ -21,8 +21,8 @@ from small_lines import (
     train,
 )
 
-from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.problem import pantograph_of
+from catenary.cases.scene.input.case_files import read_toml
+from catenary.cases.scene.scene import pantograph_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
 from catenary.mbs.lowering import Lowering

@@ -10,8 +10,7 @@ from studies import few
 
 from catenary import InputError
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.response.linearisation import linearise, of_chain
-from catenary.mbs.response.lumped_fit import BOUNDS, fit_chain
+from catenary.mbs.response import BOUNDS, fit_chain, linearise, of_chain
 
 FREQUENCIES = np.geomspace(0.1, 25.0, 120)
 CHAINS = {

@@ -23,10 +23,16 @@ from small_lines import (
 )
 
 from catenary.cases.studies.asked import Excited
-from catenary.cases.studies.waves.excited import Watch, excitation_of, without_train
-from catenary.cases.studies.waves.measured import arrived, measured_rows, transmitted
-from catenary.cases.studies.waves.seen import EnergyMotion, EnergySeen, NodeMotion, WireMotion
-from catenary.cases.studies.waves.study import study_excited
+from catenary.cases.studies.waves.seen import (
+    EnergyMotion,
+    EnergySeen,
+    NodeMotion,
+    WireMotion,
+    arrived,
+    measured_rows,
+    transmitted,
+)
+from catenary.cases.studies.waves.study import Watch, excitation_of, study_excited, without_train
 from catenary.cases.studies.waves.theory import wave_theory
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE

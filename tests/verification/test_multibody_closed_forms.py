@@ -17,16 +17,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 from variable_steps import integrate
 
-from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.bodies import SPACE, Body, point
 from catenary.mbs.rigid.forces import Gravity, SpringDamper
-from catenary.mbs.rigid.joints import (
-    Prismatic,
-    Revolute,
-    RevolutePrismatic,
-    Spherical,
-    steady,
-)
-from catenary.mbs.rigid.kinematics import point
+from catenary.mbs.rigid.joints import Prismatic, Revolute, RevolutePrismatic, Spherical, steady
 from catenary.mbs.rigid.system import System
 
 G = 9.81

@@ -15,19 +15,17 @@ from variable_steps import integrate
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.input.case_files import read_toml
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.response.frequency_response import head_response
-from catenary.mbs.response.linearisation import LinearModel, apparent_mass, linearise, of_chain
-from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.response import LinearModel, apparent_mass, head_response, linearise, of_chain
+from catenary.mbs.rigid.bodies import SPACE, Body, point
 from catenary.mbs.rigid.forces import Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.implicit_steps import Stepper
 from catenary.mbs.rigid.joints import Prismatic, Revolute, Spherical
-from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.system import System
 
 G = 9.81

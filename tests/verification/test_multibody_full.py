@@ -13,18 +13,17 @@ from seven_bodies import at_rest, calibrated, pressed
 
 from catenary import CatenaryError, InputError, RunBroken
 from catenary.mbs.build import raising_data
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension
-from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.multibody_pantograph import stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.response.linearisation import linearise
+from catenary.mbs.response import linearise
+from catenary.mbs.rigid.implicit_steps import METHODS
 from catenary.mbs.rigid.joints import PrescribedAngle
-from catenary.mbs.rigid.spin_locks import without_spins
-from catenary.mbs.rigid.step_solvers import METHODS
-from catenary.mbs.vehicle.base_motion import BaseMotion, Table, VehicleMotion
+from catenary.mbs.rigid.system import without_spins
+from catenary.mbs.vehicle import BaseMotion, Table, VehicleMotion
 
 STATIC, HEIGHT, DT = 150.0, 5.08, 1e-3
 WIRE = 5e4  # [N/m] contact, on a wire that does not give way

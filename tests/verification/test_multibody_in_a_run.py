@@ -10,8 +10,8 @@ import paper_pantograph as paper
 from measuring import History, check, check_continued, continued, start_march
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.cases.scene.input.toml_input import read_toml
-from catenary.cases.scene.problem import pantograph_of
+from catenary.cases.scene.input.case_files import read_toml
+from catenary.cases.scene.scene import pantograph_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
 from catenary.mbs.lumped_data import LumpedData

@@ -19,9 +19,9 @@ from measuring import check
 from variable_steps import integrate
 
 from catenary import InputError
+from catenary.mbs.rigid.bodies import point
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
-from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force
 from catenary.mbs.rigid.system import System
 

@@ -9,9 +9,8 @@ from constraint_handling import Baumgarte
 from measuring import check, orders, print_table
 from variable_steps import integrate
 
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning
-from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import Head
@@ -20,7 +19,7 @@ from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium
-from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
+from catenary.mbs.vehicle import BaseMotion, Harmonic, VehicleMotion
 
 EPS = np.finfo(float).eps
 ARM, HEAD = ambrosio.STABILISATION_ARM, ambrosio.HEAD

@@ -14,10 +14,9 @@ from variable_steps import integrate
 
 from catenary import InputError
 from catenary.mbs.mechanism.reduction import FINEST, reduce_mechanism
-from catenary.mbs.rigid.bodies import SPACE, Body
+from catenary.mbs.rigid.bodies import SPACE, Body, point
 from catenary.mbs.rigid.forces import BumpStop, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint, Revolute
-from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.system import System
 
 ARM = ambrosio.STABILISATION_ARM

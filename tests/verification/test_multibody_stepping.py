@@ -11,17 +11,10 @@ from scipy.special import ellipk
 from studies import few
 
 from catenary import RunBroken
-from catenary.mbs.rigid.bodies import SPACE, Body, Motion
+from catenary.mbs.rigid.bodies import SPACE, Body, Motion, point
 from catenary.mbs.rigid.forces import BumpStop, Gravity, PointForce, SpringDamper
-from catenary.mbs.rigid.implicit_steps import Stepper
+from catenary.mbs.rigid.implicit_steps import METHODS, Augmented, Partitioned, Stepper, WithFeedback
 from catenary.mbs.rigid.joints import Prismatic, Revolute, Spherical, steady
-from catenary.mbs.rigid.kinematics import point
-from catenary.mbs.rigid.step_solvers import (
-    METHODS,
-    Augmented,
-    Partitioned,
-    WithFeedback,
-)
 from catenary.mbs.rigid.system import System
 
 G = 9.81

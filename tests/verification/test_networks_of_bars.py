@@ -26,7 +26,7 @@ from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 N_SPANS, WARMER, SPEED = 6, 25.0, 15.0
 SQUARES = 2e-3

@@ -17,11 +17,11 @@ from small_lines import (
 )
 
 from catenary.cases.studies.waves.obstacles import Result, as_rows, obstacles_of, result_of
-from catenary.meshgen.hardware import SteadyArm
+from catenary.meshgen.line import SteadyArm
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
 from catenary.solver.statics.line_at_rest import line_at_rest
-from catenary.solver.waves.scattering import answer, change_of_wire, scattered
+from catenary.solver.waves.reflection import answer, change_of_wire, scattered
 
 pytestmark = pytest.mark.study
 

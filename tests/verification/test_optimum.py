@@ -14,7 +14,7 @@ import catenary
 from catenary.cases.scene.load import Draft
 from catenary.cases.scene.turned import BACKWARD
 from catenary.cases.studies.optimise import study as optimising
-from catenary.cases.studies.optimise.checks import AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN, change
+from catenary.cases.studies.optimise.study import AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN, change
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.scene_sets import (
     BROKE,
@@ -27,7 +27,7 @@ from catenary.cases.studies.scene_sets import (
 )
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance import study as tolerating
-from catenary.cases.studies.tolerance.task import ToleranceTask
+from catenary.cases.studies.tolerance.errors import ToleranceTask
 
 TENSION = "line.contact_wire.tension_N"
 SUM = ("pantographs", "histograms", "droppers", "acceptance", "not_judged", "passed", "remarks")

@@ -17,7 +17,7 @@ from small_lines import bare_wires, mesh_of, problem_of
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.wires import Conductor
 from catenary.solver.model.beam import shape_slopes, shape_values
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 # lambda = 1/m: the boundary layer fills a tenth of the span, and all meshes resolve it.
 LENGTH, LAMBDA = 10.0, 1.0

@@ -45,7 +45,7 @@ from catenary.postproc.evaluate import filters
 from catenary.solver.model.model import Model
 from catenary.solver.problem.integrator_parameters import NEWMARK, integration_of
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 # Average acceleration, a softer relative, two of Newmark's that damp, and those that damp with
 # order 2.

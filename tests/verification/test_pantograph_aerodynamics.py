@@ -18,9 +18,9 @@ from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.interface import Pantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData, reduced, stand
+from catenary.mbs.rigid.bodies import point
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
-from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.statics import equilibrium
 
 STATIC, HEIGHT, SPEED, DT = 150.0, 5.08, 300 / 3.6, 1e-3

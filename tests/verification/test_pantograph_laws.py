@@ -18,7 +18,7 @@ from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
+from catenary.mbs.vehicle import BaseMotion, Harmonic, VehicleMotion
 
 MASS = 10.0
 

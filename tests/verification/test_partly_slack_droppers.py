@@ -25,13 +25,12 @@ from hypothesis import strategies as st
 from measuring import matrix_of
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import LineResponse
-from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
+from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact_problem.coupling import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 from catenary.solver.model.link_directions import swings_of_droppers
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 # Systems have condition numbers below 1e4 and numbers of the order of one; shares are found to
 # 2e-12, and forces across them are some ten at most.

@@ -20,9 +20,9 @@ from small_lines import WHOLE, ac_simple_line, en50318_line, mesh_of, numerics, 
 from studies import few
 
 from catenary import InputError
+from catenary.solver import ends
 from catenary.solver.effects.build_model import build
-from catenary.solver.ends import periodic_end
-from catenary.solver.ends.half_lines import Chain, half_lines
+from catenary.solver.ends import Chain, half_lines
 from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.problem.ends import AbsorbingLayer, Fixed, Periodic
 from catenary.solver.problem.problem import Damping, Numerics, Problem
@@ -196,7 +196,7 @@ def test_a_line_on_which_a_force_is_felt_without_end_is_refused(
     def without_end(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         raise InputError("what acts on it does not fade")
 
-    monkeypatch.setattr(periodic_end, "half_lines", without_end)
+    monkeypatch.setattr(ends, "half_lines", without_end)
     with pytest.raises(InputError, match=r"line\.ends\.start\.kind is periodic, but .* not fade"):
         struck_line(3, numerics(DT), 1, (Periodic(), Fixed()))
 

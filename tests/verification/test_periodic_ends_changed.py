@@ -12,13 +12,12 @@ from measuring import check
 from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of
 
 from catenary import InputError
-from catenary.meshgen.line import DropperPlace
+from catenary.meshgen.line import Curve, DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
-from catenary.meshgen.track import Curve
 from catenary.solver.problem.defects import Defect, MissingDropper, WornWire, WrongTension
 from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.wind import Wind
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 SPAN, SHORT, BESIDE = 55.0, 6, 6
 DEFECTS = frozenset({"worn_wire", "wrong_tension", "missing_dropper", "wind", "periodic_ends"})

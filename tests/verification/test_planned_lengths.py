@@ -18,9 +18,9 @@ from scenes import Scene, line_data_of, load_scene, mesh_of, problem_of
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.run.at_rest.planned_lengths import take_in_lengths
+from catenary.cases.run.planned_lengths import take_in_lengths
 from catenary.cases.scene.starter import write_case
-from catenary.solver.statics.form_finding.equilibrium import lengths_to_cut
+from catenary.solver.statics.form_finding import lengths_to_cut
 
 HALF_A_DIGIT, LEFT = 0.05, 0.02  # [mm]
 N = 13

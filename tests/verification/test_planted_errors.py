@@ -19,8 +19,7 @@ from scenes import load_scene
 from scipy import signal
 
 from catenary.cases.run.runner import run_case
-from catenary.cases.studies.measured.description import read_description
-from catenary.cases.studies.measured.passages import passage_of, read_table
+from catenary.cases.studies.measured import passage_of, read_description, read_table
 from catenary.postproc.measurements.compared import Comparison
 from catenary.postproc.measurements.comparison import compare_with
 from catenary.postproc.read.results import Results

@@ -12,15 +12,15 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.head.head_arrays import N_DRIVE, drive_width
 from catenary.mbs.head.strips import Strips, Turning
+from catenary.mbs.interface import N_DRIVE, drive_width
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, leads_of
 from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 RAKE = math.radians(20.0)
 NAMES = WHOLE | {"raked_strips"}

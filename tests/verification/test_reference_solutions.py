@@ -25,8 +25,7 @@ from scenes import problem_of as scene_problem
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 from verb_runner import invoke
 
-from catenary.cases.studies.reference.convergence import rms
-from catenary.cases.studies.reference.solutions import DATA, Solution, read
+from catenary.cases.studies.reference.solutions import DATA, Solution, read, rms
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.topologies.line_data import ClampedWire
 from catenary.meshgen.wires import Conductor

@@ -18,7 +18,7 @@ from scenes import load_scene, mesh_of, problem_of
 from catenary import InputError
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 TENSION, SPAN, BENDING = 10e3, 30.0, 110.0
 # By which a steady arm itself gives [m/N].

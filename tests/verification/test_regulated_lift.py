@@ -11,7 +11,7 @@ from measuring import check
 from scipy import signal
 
 from catenary.mbs.build import raising_data
-from catenary.mbs.control import Regulation
+from catenary.mbs.head.laws import Regulation
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData

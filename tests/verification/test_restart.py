@@ -9,8 +9,7 @@ import pytest
 from measuring import check, check_continued, continued, march
 from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.control import Regulation
-from catenary.mbs.head.laws import Law
+from catenary.mbs.head.laws import Law, Regulation
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import steps_of
 

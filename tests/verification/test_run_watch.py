@@ -15,7 +15,7 @@ import pytest
 from measuring import COMM, History, check, march
 from small_lines import HANGING, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.meshgen.hardware import DropperKind
+from catenary.meshgen.line import DropperKind
 from catenary.postproc.record.run_watch import RunWatch
 from catenary.solver.effects.shipped.stiff_link_effects import NAME
 from catenary.solver.problem.problem import Damping, Problem

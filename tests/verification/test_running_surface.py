@@ -6,19 +6,20 @@ import numpy as np
 from measuring import check, march
 from small_lines import BARE, EN_CONTACT_WIRE, FREE_MASS, bare_wires, mesh_of, problem_of, train
 
-from catenary.mbs.vehicle.irregularity import N_WAVES
+from catenary.mbs.vehicle import N_WAVES
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.defects import Kink, WornWire
-from catenary.solver.problem.irregularities import (
+from catenary.solver.problem.defects import (
     BentWire,
     Heights,
     HeightSpectrum,
     Irregularities,
+    Kink,
     LengthErrors,
+    WornWire,
 )
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 WAVY = BARE | {"gravity", "running_surface", "contact_loss", "kink"}
 

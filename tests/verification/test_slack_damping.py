@@ -22,14 +22,10 @@ from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.model.partition import distribute
-from catenary.solver.problem.incidents import DropperBreak
+from catenary.solver.problem.defects import DropperBreak
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.changed_line.after_incidents import (
-    acceleration_jump,
-    changed_line,
-    unchanged,
-)
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.after_incidents import acceleration_jump, changed_line, unchanged
+from catenary.solver.statics.form_finding import find_form
 
 EPS = np.finfo(float).eps
 # The damping of the paper's average line; the droppers' is 2.75 kN s/m with it.

@@ -19,7 +19,7 @@ from studies import few
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 ALPHA = 2e-4
 PLANES = {"lateral": {"lateral_motion"}, "three": {"lateral_motion", "axial_motion"}}

@@ -12,16 +12,16 @@ from small_lines import ac_simple_line, mesh_of, problem_of
 from spatial_line import SpatialLine, shape
 from studies import few
 
+from catenary.meshgen.line import Curve
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.track import Curve
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.problem.defects import Irregularities, LengthErrors
 from catenary.solver.problem.ends import AlongTrack
-from catenary.solver.problem.irregularities import Irregularities, LengthErrors
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.wind import Wind
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 SPATIAL = HANGING_ALONG | {"lateral_motion", "dropper_lengths", "wind"}
 ALPHA = 1.7e-5

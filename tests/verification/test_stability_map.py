@@ -14,9 +14,9 @@ from scipy import linalg
 from small_lines import EN_PANTOGRAPH, HANGING, en50318_line, mesh_of, problem_of
 
 from catenary.cases.studies.records import KeptRows
-from catenary.cases.studies.stability import from_matrices as theory
+from catenary.cases.studies.stability import coupling_schemes as theory
 from catenary.cases.studies.stability import map as map_of_stability
-from catenary.cases.studies.stability.by_marching import COUPLINGS, Bench
+from catenary.cases.studies.stability.coupling_schemes import COUPLINGS, Bench
 from catenary.cases.studies.stability.map import RESOLUTION, Grid, as_rows, draw, find, make_map
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.contact.contact_wire import ContactWires

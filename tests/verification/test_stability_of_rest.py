@@ -16,8 +16,8 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of
 from catenary import InputError
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
-from catenary.solver.statics.form_finding.equilibrium import find_form
-from catenary.solver.statics.stability_of_rest import refuse_unstable
+from catenary.solver.statics.form_finding import find_form
+from catenary.solver.statics.line_at_rest import refuse_unstable
 
 # Of the arms of ac_simple [m], and the forces with which they are pushed [N].
 FORCES = (500.0, 2e3, 4e3, 6e3, 8e3, 1.2e4, 2e4)
@@ -73,5 +73,5 @@ def test_a_line_without_pushed_parts_is_not_factored(monkeypatch: pytest.MonkeyP
     def fails(model: Model) -> None:
         raise AssertionError("the stiffness was factored")
 
-    monkeypatch.setattr("catenary.solver.statics.stability_of_rest._first_unstable", fails)
+    monkeypatch.setattr("catenary.solver.statics.line_at_rest._first_unstable", fails)
     refuse_unstable(model)

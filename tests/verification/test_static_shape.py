@@ -18,12 +18,12 @@ from small_lines import (
 )
 
 from catenary import InputError
-from catenary.meshgen.hardware import Fittings
+from catenary.meshgen.line import Fittings
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.statics.elasticity import middle_span
-from catenary.solver.statics.form_finding.equilibrium import find_form, lengths_to_cut
+from catenary.solver.statics.form_finding import find_form, lengths_to_cut
 
 GRAVITY = 9.81
 EPS = np.finfo(float).eps

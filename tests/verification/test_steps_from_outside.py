@@ -12,7 +12,7 @@ from measuring import check
 from scenes import with_words
 
 import catenary
-from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.input.case_files import read_toml
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"
 DT, RAISED = 1e-3, 0.1

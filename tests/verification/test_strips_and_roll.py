@@ -12,9 +12,8 @@ from scipy.integrate import solve_ivp
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
 from catenary.mbs.build import raising_data
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning
-from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph

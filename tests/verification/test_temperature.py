@@ -26,7 +26,7 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.ends import AlongTrack, Tensioner
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 ALPHA = 1.7e-5
 EPS = np.finfo(float).eps

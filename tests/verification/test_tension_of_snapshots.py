@@ -10,18 +10,25 @@ from axial_lines import ALONG, elastic_line
 from measuring import check
 from small_lines import mesh_of, problem_of
 
+from catenary.meshgen.line import Curve
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.track import Curve
-from catenary.postproc.record.snapshots.blocks import RecordedLine, blocks_of
-from catenary.postproc.record.snapshots.field_kinds import ALONG as U
-from catenary.postproc.record.snapshots.field_kinds import ASIDE, KINDS, SLOPE, TURN, UP
+from catenary.postproc.record.snapshots.contents import ALONG as U
+from catenary.postproc.record.snapshots.contents import (
+    ASIDE,
+    KINDS,
+    SLOPE,
+    TURN,
+    UP,
+    RecordedLine,
+    blocks_of,
+)
 from catenary.postproc.record.snapshots.field_layout import FieldRecord, layout_of
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.solver.effects.all_effects import with_defects
-from catenary.solver.model.axial_elements import strain_rows, unknowns_along
+from catenary.solver.model.axial_motion import strain_rows, unknowns_along
 from catenary.solver.problem.defects import WornWire
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 def staggered() -> LineData:

@@ -11,8 +11,7 @@ from more_wires import data_of
 from small_lines import ac_simple_line, bare_wires, problem_of
 
 from catenary.meshgen.build import make_mesh
-from catenary.meshgen.hardware import SteadyArm
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import Line, SteadyArm
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import BRIDLE_WIRE, make_line, second
 from catenary.meshgen.topologies.line_data import ClampedWire, LineData, Overlaps, Twin
@@ -20,7 +19,7 @@ from catenary.meshgen.topologies.overlaps import of_next
 from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.model import beam
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium, find_form
+from catenary.solver.statics.form_finding import Equilibrium, find_form
 
 GRAVITY = 9.81
 TWIN = Twin(0.06, False)

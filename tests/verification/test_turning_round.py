@@ -14,8 +14,7 @@ from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, 
 from catenary.mbs.rigid.bodies import Body
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PointOnCurve, PrescribedPoint
-from catenary.mbs.rigid.reversed_system import turned_round
-from catenary.mbs.rigid.system import System
+from catenary.mbs.rigid.system import System, turned_round
 
 EPS = np.finfo(float).eps
 KNEE = (-0.820, 0.0, 0.0)

@@ -14,8 +14,14 @@ from scipy import stats
 
 from catenary.cases.studies.sampling.samples import samples
 from catenary.cases.studies.sampling.tables import SamplingTable, sampling_of
-from catenary.cases.studies.uncertainty.estimates import deviation, mean, quantile, share
-from catenary.cases.studies.uncertainty.evaluation import evaluate, failing
+from catenary.cases.studies.uncertainty.evaluation import (
+    deviation,
+    evaluate,
+    failing,
+    mean,
+    quantile,
+    share,
+)
 from catenary.cases.studies.uncertainty.run_table import RunTable, run_table
 
 REPETITIONS = 1000

@@ -13,7 +13,7 @@ import catenary
 from catenary.meshgen.mesh import MESSENGER_WIRE
 from catenary.solver.problem.defects import WrongTension
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 GAP, STIFFNESS = 0.03, 1e5
 

@@ -10,9 +10,17 @@ import pytest
 from measuring import check
 from scipy.integrate import solve_ivp
 
-from catenary.mbs.vehicle.base_motion import BaseMotion, Table, VehicleMotion
-from catenary.mbs.vehicle.irregularity import Irregularity
-from catenary.mbs.vehicle.suspension import GRAVITY, Sideways, Vehicle, matrices, transfer
+from catenary.mbs.vehicle import (
+    GRAVITY,
+    BaseMotion,
+    Irregularity,
+    Sideways,
+    Table,
+    Vehicle,
+    VehicleMotion,
+    matrices,
+    transfer,
+)
 
 # Of a coach, after the Manchester benchmarks (S. Iwnicki, Vehicle System Dynamics 30, 1998).
 ON_TRACK = Vehicle(

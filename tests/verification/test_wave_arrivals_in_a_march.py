@@ -12,8 +12,7 @@ import pytest
 from scenes import load_scene, problem_of
 
 import catenary
-from catenary.cases.run.describe.arrivals import arrival_facts, wave_line
-from catenary.cases.run.describe.wave_arrivals import Course, from_far_end
+from catenary.cases.run.arrivals import Course, arrival_facts, from_far_end, wave_line
 
 # A contact force that differs by more is another one [N]: 4e-5 of the standard deviation, far above
 # round-off, which is 1e-9.

@@ -16,10 +16,8 @@ from catenary.solver.model.loads import FieldLoad
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.wind import Gusts, Stretch, Wind, friction_velocity_of
-from catenary.solver.statics.form_finding.equilibrium import find_form
-from catenary.solver.wind.gust_field import GustField, narrowed
-from catenary.solver.wind.spectra import UPWARD
-from catenary.solver.wind.wind_at import gust_points
+from catenary.solver.statics.form_finding import find_form
+from catenary.solver.wind import UPWARD, GustField, gust_points, narrowed
 
 SPAN, RHO = 60.0, 1.225
 DIAMETER, DRAG = 0.0144, 1.2

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from catenary.cases.cli import completion
+from catenary.cases.cli import command_words
 from catenary.cases.cli.app import (
     Force,
     Out,
@@ -84,7 +84,7 @@ def sensitivity(
             "-p",
             "--parameter",
             metavar="KEY",
-            autocompletion=completion.keys,
+            autocompletion=command_words.keys,
             help="Key of a number, or of a list whose entries change together, with .0, .1 ... "
             "for one of its entries; repeatable. Those of pantographs, contact, wires, droppers "
             "and damping if absent.",
@@ -113,7 +113,7 @@ def sensitivity(
     force: Force = False,
 ) -> int:
     """Serial."""
-    from catenary.sensitivities import AT_REST, SENSITIVITIES, derivatives, rest_derivatives
+    from catenary.parameters import AT_REST, SENSITIVITIES, derivatives, rest_derivatives
 
     scene = words.scene()
     if out is not None:
@@ -150,7 +150,7 @@ def identify(
     force: Force = False,
 ) -> int:
     """Serial."""
-    from catenary.identifications import identified, identified_files, task_of
+    from catenary.parameters import identified, identified_files, task_of
 
     wanted = task_of(task)
     scene = words.scene()

@@ -187,7 +187,7 @@ def worst(
     if out is not None:
         refuse_impossible(out)
     console.alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.questions.worst_output import answer_of
+    from catenary.cases.studies.questions.worst import answer_of
     from catenary.postproc.read.results import Results
 
     with Results(folder, records) as results:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
-from catenary.base.paths import is_file
+from catenary.base.files import is_file
 from catenary.cases.cli.app import Force, SceneWords, folder_option, leave, serial_verb
 from catenary.cases.result_folder.output_folder import (
     refuse_impossible,

@@ -15,14 +15,13 @@ from catenary.cases.scene.line.imperfections import (
     WrongTensionTable,
     stretch_of,
 )
-from catenary.cases.scene.problem import end_of, line_of
 from catenary.cases.scene.run.incidents import (
     DropperBreakTable,
     IncidentTable,
     LoweringTable,
     TensionLossTable,
 )
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, end_of, line_of
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.topologies.all_topologies import make_line

@@ -8,10 +8,9 @@ from collections.abc import Iterator, Mapping
 
 from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.keys.table import take_away
-from catenary.cases.scene.line.droppers import FEWEST_SAGGING
+from catenary.cases.scene.line.hardware import FEWEST_SAGGING
 from catenary.cases.scene.line.line_data import arm_tables, dropper_tables
-from catenary.cases.scene.problem import problem_of
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, problem_of
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData

@@ -9,14 +9,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import Fault
-from catenary.cases.scene.line.droppers import HangingTable, hung_in
-from catenary.cases.scene.line.free import (
-    FreeArmsTable,
-    FreeClampsTable,
-    FreeDroppersTable,
-    FreeSupportsTable,
-    FreeWireTable,
-)
+from catenary.cases.scene.line.hardware import HangingTable, hung_in
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import (
     FIXED,
@@ -25,9 +18,16 @@ from catenary.cases.scene.line.line_data import (
     span_lengths,
     stretches_of,
 )
+from catenary.cases.scene.line.wires import (
+    FreeArmsTable,
+    FreeClampsTable,
+    FreeDroppersTable,
+    FreeSupportsTable,
+    FreeWireTable,
+)
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import SAME_CUT, Cuts, divisions_of
-from catenary.meshgen.hardware import Clamps
+from catenary.meshgen.line import Clamps
 from catenary.meshgen.mesh import ANCHORS
 from catenary.meshgen.topologies.free import carriers, hung, in_order
 from catenary.meshgen.topologies.line_data import (

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.table import take_away
-from catenary.cases.scene.problem import problem_of
 from catenary.cases.scene.run.contact import HERTZ, WITH_RESTITUTION
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, problem_of
 from catenary.solver.problem.integrator_parameters import NEWMARK
 from catenary.solver.window.choice import why_no_window
 

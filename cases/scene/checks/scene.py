@@ -14,32 +14,33 @@ from typing import Any
 
 from catenary.base.errors import InputError
 from catenary.cases.scene.checks import (
-    air,
     defects,
     effects,
     free,
+    line_tables,
     mesh_size,
-    motion,
     numerics,
     pantographs,
-    topology,
 )
 from catenary.cases.scene.input.faults import Fault, Origin, SceneError, UnfitScene
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import is_known, known_keys
-from catenary.cases.scene.keys.units import unit_of
-from catenary.cases.scene.keys.usual_values import USUAL, unit_guess
-from catenary.cases.scene.problem import end_of, strips_ahead
+from catenary.cases.scene.keys.keys import is_known, known_keys, unknown_key
+from catenary.cases.scene.keys.units import USUAL, unit_guess, unit_of
 from catenary.cases.scene.run.case import chosen_books
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, end_of, strips_ahead
 from catenary.meshgen.slowest_wave import bends, slowest_wave
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.postproc.channels.places_on_train import in_sentence, places_on_train
-from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
-from catenary.postproc.standards.book import RuleBook, book_of
-from catenary.postproc.standards.library import DEFAULT, book_named, editions_of, shipped
-from catenary.postproc.standards.quantities import SYSTEMS
+from catenary.postproc.channels.header import in_sentence, places_on_train
+from catenary.postproc.record.snapshots.contents import OTHER_PARTS
+from catenary.postproc.standards.rule_books import (
+    DEFAULT,
+    SYSTEMS,
+    RuleBook,
+    book_named,
+    book_of,
+    editions_of,
+    shipped,
+)
 from catenary.solver.effects.effect import Limit
 
 # Two heads cannot stand closer on a roof; their contacts would also share one finite element.
@@ -58,7 +59,7 @@ def check(scene: Scene) -> None:
 def faults_of(scene: Scene) -> list[Fault]:
     """All in which a scene contradicts itself."""
     found = _Findings()
-    whole = found.collect(topology.check_topology, scene)
+    whole = found.collect(line_tables.check_topology, scene)
     for of_tables in _OF_TABLES:
         found.collect(of_tables, scene)
     if found.collect(_pantograph_names, scene):
@@ -70,16 +71,16 @@ def faults_of(scene: Scene) -> list[Fault]:
     line = _line(scene, found) if sound and whole else None
     if line is None:
         return found.faults
-    if not found.collect(topology.check_parts, scene, line):
+    if not found.collect(line_tables.check_parts, scene, line):
         return found.faults
-    if not found.collect(topology.check_names, scene, line):
+    if not found.collect(line_tables.check_names, scene, line):
         return found.faults
     of_lines = (
-        topology.check_dropper_lengths,
+        line_tables.check_dropper_lengths,
         check_recorded_parts,
-        air.check_tunnels,
-        air.check_crosswind,
-        air.check_wind,
+        pantographs.check_tunnels,
+        pantographs.check_crosswind,
+        pantographs.check_wind,
         _speed,
         defects.check_defects,
         effects.check_idle,
@@ -88,13 +89,13 @@ def faults_of(scene: Scene) -> list[Fault]:
         found.collect(of_line, scene, line)
     if found.collect(_running, scene, line) and found.collect(_evaluation, scene):
         found.collect(_raising, scene)
-        found.collect(motion.check_ends, scene, line)
-        found.collect(motion.check_along, scene, line)
+        found.collect(line_tables.check_ends, scene, line)
+        found.collect(line_tables.check_along, scene, line)
     if found.faults:
         return found.faults
     # Checks that may need multibody systems come last: other faults are reported at once.
     if found.collect(pantographs.check_mechanisms, scene, line):
-        found.collect(air.check_uplift, scene)
+        found.collect(pantographs.check_uplift, scene)
         found.collect(effects.check_requirements_of_defaults, scene)
         found.collect(pantographs.check_vehicle, scene, line)
         if found.collect(defects.check_incidents, scene, line):
@@ -132,7 +133,7 @@ def _line(scene: Scene, found: _Findings) -> LineData | None:
     except InputError as error:
         found.faults.append(Fault("", str(error)))
         return None
-    checks = topology.check_droppers_inside_spans, free.check_free_droppers
+    checks = line_tables.check_droppers_inside_spans, free.check_free_droppers
     inside = [found.collect(of_line, scene, line) for of_line in checks]
     return line if all(inside) else None
 
@@ -149,7 +150,7 @@ def _pantograph_names(scene: Scene) -> Iterator[Fault]:
     for i, place in enumerate(scene.train.pantographs):
         if place.name not in scene.pantographs:
             yield from scene.among(f"train.pantographs.{i}.name", scene.pantographs)
-        elif place.reversed and not air.has_front(scene.pantographs[place.name]):
+        elif place.reversed and not pantographs.has_front(scene.pantographs[place.name]):
             yield scene.refused(
                 f"train.pantographs.{i}.reversed",
                 f"{place.name} is a chain of lumped masses, with no front but what "
@@ -363,7 +364,7 @@ _OF_TABLES: tuple[Callable[[Scene], Iterator[Fault]], ...] = (
     effects.check_effect_names,
     effects.check_requirements_of_chosen,
     effects.check_effect_data,
-    motion.check_lateral,
+    line_tables.check_lateral,
     numerics.check_contact,
     numerics.check_iterations,
     _separations,

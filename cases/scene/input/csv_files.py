@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
+from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.input.faults import Fault, Origin, shown
 from catenary.cases.scene.input.plain_text import read_text
-from catenary.cases.scene.input.toml_input import read_toml
-from catenary.postproc.standards.book import book_of
+from catenary.postproc.standards.rule_books import book_of
 
 _LONGEST_NAME = 1000
 _QUOTED_COMMA = re.compile(r'"[^",]*,[^"]*"')

@@ -20,12 +20,7 @@ from catenary.cases.scene.keys.table import (
 from catenary.cases.scene.keys.units import angle_from_deg, length_from_mm
 from catenary.meshgen.line import Line
 from catenary.solver.problem import defects as solver
-from catenary.solver.problem.irregularities import (
-    Heights,
-    HeightSpectrum,
-    Irregularities,
-    LengthErrors,
-)
+from catenary.solver.problem.defects import Heights, HeightSpectrum, Irregularities, LengthErrors
 
 if TYPE_CHECKING:
     from catenary.solver.problem.defects import Defect as SolverDefect

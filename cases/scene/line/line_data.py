@@ -9,23 +9,27 @@ import numpy as np
 
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.keys.units import length_from_mm
-from catenary.cases.scene.line.droppers import DropperTable, Hung, dropper_kind, hung_in
-from catenary.cases.scene.line.free import (
+from catenary.cases.scene.line.hardware import (
+    DropperTable,
+    Hung,
+    SteadyArmTable,
+    dropper_kind,
+    hung_in,
+    steady_arm,
+)
+from catenary.cases.scene.line.line import LineTable, curve_of
+from catenary.cases.scene.line.wires import (
+    AuxiliaryWireTable,
     FreeArmsTable,
     FreeClampsTable,
     FreeDroppersTable,
     FreeSupportsTable,
     FreeWireTable,
-)
-from catenary.cases.scene.line.hardware import SteadyArmTable, steady_arm
-from catenary.cases.scene.line.line import LineTable, curve_of
-from catenary.cases.scene.line.wires import (
-    AuxiliaryWireTable,
     WireTable,
     clamped_wire_of,
     conductor,
 )
-from catenary.meshgen.hardware import Clamps, SteadyArms, Supports
+from catenary.meshgen.line import Clamps, SteadyArms, Supports
 from catenary.meshgen.topologies.line_data import (
     AuxiliaryWire,
     Course,

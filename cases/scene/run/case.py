@@ -7,11 +7,14 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from catenary.cases.scene.keys.table import StretchTable, Table, either
-from catenary.postproc.record.snapshots.blocks import OTHER_PARTS
-from catenary.postproc.record.snapshots.field_kinds import FIELDS, USUAL_FIELDS
-from catenary.postproc.standards.book import RuleBook
-from catenary.postproc.standards.library import DEFAULT, book_named, books_of_entries
-from catenary.postproc.standards.quantities import LIMIT_KEYS
+from catenary.postproc.record.snapshots.contents import FIELDS, OTHER_PARTS, USUAL_FIELDS
+from catenary.postproc.standards.rule_books import (
+    DEFAULT,
+    LIMIT_KEYS,
+    RuleBook,
+    book_named,
+    books_of_entries,
+)
 from catenary.solver.time_loop.views.channels import line_channels
 
 

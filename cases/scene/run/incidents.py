@@ -9,7 +9,7 @@ from pydantic import Field
 
 from catenary.cases.scene.keys.table import Table, WireName
 from catenary.meshgen.line import Line
-from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
+from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
 
 if TYPE_CHECKING:
     from catenary.mbs.lowering import Lowering

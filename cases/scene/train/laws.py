@@ -11,8 +11,7 @@ from catenary.cases.scene.keys.table import PAIR, Table, ascending, exactly_one
 from catenary.cases.scene.keys.units import speed_from_km_h
 from catenary.mbs.air import Polynomial, Uplift
 from catenary.mbs.air import Table as SpeedTable
-from catenary.mbs.control import Regulation
-from catenary.mbs.head.laws import Law
+from catenary.mbs.head.laws import Law, Regulation
 
 # Straight lines through more would make a law as stiff as the stiffest of its parts.
 _STIFFEST = 1e8

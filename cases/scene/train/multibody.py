@@ -15,7 +15,6 @@ from catenary.cases.scene.train import mechanism as schema
 from catenary.cases.scene.train.head import strips_of
 from catenary.cases.scene.train.pantograph import MultibodyTable, wanted_force
 from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData
-from catenary.mbs.rigid.arrays import Joint
 from catenary.mbs.rigid.bodies import Body
 from catenary.mbs.rigid.forces import (
     Actuator,
@@ -29,6 +28,7 @@ from catenary.mbs.rigid.forces import (
 from catenary.mbs.rigid.joints import (
     Constant,
     Fixed,
+    Joint,
     PointOnCurve,
     PointOnLine,
     PrescribedAngle,
@@ -38,8 +38,7 @@ from catenary.mbs.rigid.joints import (
     RevolutePrismatic,
     Spherical,
 )
-from catenary.mbs.rigid.reversed_system import turned_round
-from catenary.mbs.rigid.system import System
+from catenary.mbs.rigid.system import System, turned_round
 
 
 def turned(data: MultibodyData) -> MultibodyData:

@@ -17,10 +17,16 @@ from catenary.cases.scene.keys.table import (
     within,
 )
 from catenary.cases.scene.keys.units import angle_from_deg
-from catenary.mbs.vehicle.base_motion import Harmonic, Source, VehicleMotion
-from catenary.mbs.vehicle.base_motion import Table as MotionOf
-from catenary.mbs.vehicle.irregularity import Irregularity
-from catenary.mbs.vehicle.suspension import GRAVITY, Sideways, Vehicle
+from catenary.mbs.vehicle import (
+    GRAVITY,
+    Harmonic,
+    Irregularity,
+    Sideways,
+    Source,
+    Vehicle,
+    VehicleMotion,
+)
+from catenary.mbs.vehicle import Table as MotionOf
 
 
 class PlacementTable(Table):

@@ -180,7 +180,7 @@ def _fitted(scene: Scene, kind: str, n_masses: int) -> Level:
 def planes(scene: Scene) -> list[Level]:
     """Planes in which wires move: sideways, and along the track if they have what that needs."""
     from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
-    from catenary.cases.scene.problem import problem_of
+    from catenary.cases.scene.scene import problem_of
     from catenary.solver.effects import all_effects
 
     problem = problem_of(scene)

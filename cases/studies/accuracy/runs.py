@@ -15,8 +15,7 @@ from scipy.interpolate import CubicSpline
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, resolved
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
 from catenary.cases.studies.accuracy.axes import Axis, Level, Reference
 from catenary.cases.studies.sweep.jobs import (

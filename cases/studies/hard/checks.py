@@ -16,14 +16,14 @@ import numpy as np
 
 from catenary.base.parallel import on_root
 from catenary.cases.process.workers import WorkerLost
-from catenary.cases.scene.problem import resolved
+from catenary.cases.scene.scene import resolved
 from catenary.cases.studies.hard import runs as hard_runs
 from catenary.cases.studies.hard.cases import HardCase
 from catenary.cases.studies.hard.runs import RunHistories, cut_of, rest_height
 from catenary.cases.studies.records import NOTHING_KEPT, KeptRows
 from catenary.postproc.report.study_table import Column, StudyTable, file_table, remark_lines
 from catenary.solver.model.beam import shape_slopes
-from catenary.solver.problem.incidents import DropperBreak, LineIncident, in_steps
+from catenary.solver.problem.defects import DropperBreak, LineIncident, in_steps
 from catenary.solver.statics.line_at_rest import LineAtRest
 
 # Gauss's rule of three points is exact for the square of a cubic's slope.

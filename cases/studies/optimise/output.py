@@ -7,10 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from catenary.cases.scene.keys.units import unit_of
-from catenary.cases.studies.optimise.checks import AS_IS, COMPARED, Row, change
-from catenary.cases.studies.optimise.droppers import of_middle_span
-from catenary.cases.studies.optimise.objective import Point
-from catenary.cases.studies.optimise.study import Optimum, Plan
+from catenary.cases.studies.optimise.search import Point, of_middle_span
+from catenary.cases.studies.optimise.study import AS_IS, COMPARED, Optimum, Plan, Row, change
 from catenary.cases.studies.sweep.variants import text_of
 from catenary.postproc.files.disk import plain
 from catenary.postproc.report.study_table import (

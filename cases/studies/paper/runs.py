@@ -14,7 +14,7 @@ from string import Template
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.toml_input import read_toml
+from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.scene import Scene
 from catenary.cases.studies.case_study import StudyRun, StudyVariant
 from catenary.cases.studies.sweep.variants import Variant, check_keys, slug

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.toml_input import parse_assignment
+from catenary.cases.scene.input.case_files import parse_assignment
 from catenary.cases.studies.sweep.jobs import (
     OF_LINE,
     OF_PANTOGRAPH,
@@ -32,9 +32,8 @@ from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.files.disk import plain
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.page import page
-from catenary.postproc.report.pictures import figures, overlays
-from catenary.postproc.report.sections.section import Picture, Section, Text
+from catenary.postproc.report.page import Picture, Section, Text, page
+from catenary.postproc.report.pictures import along_track, figures
 from catenary.postproc.report.study_table import Column, Content, StudyTable, remark_lines
 
 AS_IT_IS, CHANGED, DIFFERENCE = "as_it_is", "changed", "difference"
@@ -293,7 +292,7 @@ def draw_forces(a: Results, b: Results) -> Figure | None:
         )
         for p, name in enumerate(names)
     ]
-    return overlays.forces(panels, a.evaluation, f"{filters.CUT_OFF:g} Hz")
+    return along_track.forces(panels, a.evaluation, f"{filters.CUT_OFF:g} Hz")
 
 
 def _force(run: Results, pantograph: int) -> np.ndarray:
@@ -310,4 +309,4 @@ def draw_uplift(a: Results, b: Results) -> Figure | None:
         (words, run.line("arm_x"), run.extremes("arm_uplift")[1])
         for run, words in zip((a, b), WORDS.values(), strict=True)
     ]
-    return overlays.uplifts(curves, a.evaluation)
+    return along_track.uplifts(curves, a.evaluation)

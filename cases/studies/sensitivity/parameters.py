@@ -25,12 +25,11 @@ from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.run.prepared import rest_of
 from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.scene.input.case_files import value_at
 from catenary.cases.scene.input.faults import Origin, shown
-from catenary.cases.scene.input.toml_input import value_at
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.load import scene_from
-from catenary.cases.scene.problem import line_of, problem_of, resolved
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, line_of, problem_of, resolved
 from catenary.cases.studies.sweep.variants import check_key, is_number
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.statics.line_at_rest import LineAtRest, SoundLine, line_at_rest, sound_line

@@ -1,7 +1,7 @@
 """The stability map: largest step of each coupling against contact stiffness and head mass.
 
-Each point of the map is found twice: from the matrices of a step (`from_matrices`) and by marching
-(`by_marching`).
+Each point of the map is found twice: from the matrices of a step and by marching
+(`coupling_schemes`).
 """
 
 from __future__ import annotations
@@ -18,13 +18,12 @@ from matplotlib.lines import Line2D
 from catenary.base.errors import InputError
 from catenary.cases.process.workers import WorkerLost
 from catenary.cases.scene.load import Draft, load_scene
-from catenary.cases.scene.problem import resolved
 from catenary.cases.scene.run.numerics import MAX_DT
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, resolved
 from catenary.cases.studies.hard.runs import at_rest
 from catenary.cases.studies.records import NOTHING_KEPT, KeptRows
-from catenary.cases.studies.stability import from_matrices as theory
-from catenary.cases.studies.stability.by_marching import (
+from catenary.cases.studies.stability import coupling_schemes as theory
+from catenary.cases.studies.stability.coupling_schemes import (
     AGREED,
     COUPLINGS,
     EXCHANGES,

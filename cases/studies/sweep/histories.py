@@ -16,16 +16,15 @@ from typing import Any
 import h5py
 import numpy as np
 
-from catenary.base.whole_files import appears_whole
+from catenary.base.files import appears_whole
 from catenary.cases.result_folder.output_folder import remove_dead_parts
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import HISTORIES
 from catenary.cases.studies.sweep.variants import Variant
+from catenary.postproc.files.committed_rows import PATH as FILTERED
 from catenary.postproc.files.dimensions import CONVENTIONS
 from catenary.postproc.files.disk import MARGIN, opened, reserve, unwritten
-from catenary.postproc.files.filtered_force import PATH as FILTERED
-from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
-from catenary.postproc.files.hdf5.self_contained import open_own
+from catenary.postproc.files.hdf5 import HDF5_ERRORS, open_own
 
 FILE = "histories.h5"
 # Attribute that says of which sweep a joined file is.

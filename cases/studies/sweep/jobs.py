@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, TypeVar
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.options import option
 from catenary.cases.process.interrupts import Interrupted
+from catenary.cases.scene.input.case_files import Assigned
 from catenary.cases.scene.input.faults import UnfitScene, shown
-from catenary.cases.scene.input.toml_input import Assigned
 from catenary.cases.scene.keys.keys import meant
 from catenary.cases.scene.load import Draft, load_scene, read_draft
 from catenary.cases.scene.scene import Scene

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import CatenaryError, InputError
+from catenary.base.files import is_file, is_there
 from catenary.base.parallel import on_root
-from catenary.base.paths import is_file, is_there
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.petsc_options import idle_names, look_up_all_but, start_petsc
 from catenary.cases.process.workers import Outcome, WorkerLost, at_once, each
@@ -30,9 +30,9 @@ from catenary.cases.result_folder.output_folder import (
     refuse_earlier,
     refuse_impossible,
 )
-from catenary.cases.run.planning.needs import Kept, total_size
+from catenary.cases.run.needs import Kept, total_size
 from catenary.cases.run.runner import run_case
-from catenary.cases.scene.problem import resolved
+from catenary.cases.scene.scene import resolved
 from catenary.cases.studies.records import is_whole, read_record, read_table, write_record
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
 from catenary.cases.terminal.runs_bar import RunsBar

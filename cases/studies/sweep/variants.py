@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.errors import InputError
 from catenary.base.options import option
+from catenary.cases.scene.input.case_files import parse_assignment, read_toml
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.input.plain_text import steers
-from catenary.cases.scene.input.toml_input import parse_assignment, read_toml
-from catenary.cases.scene.keys.error_sentences import unknown_key
-from catenary.cases.scene.keys.keys import known_keys, list_of, names_value
+from catenary.cases.scene.keys.keys import known_keys, list_of, names_value, unknown_key
 from catenary.postproc.files.csv_text import begins_formula
 
 if TYPE_CHECKING:

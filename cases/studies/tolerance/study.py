@@ -23,9 +23,16 @@ from catenary.cases.studies.scene_sets import (
     values_of,
 )
 from catenary.cases.studies.sweep.jobs import STATISTICS
-from catenary.cases.studies.tolerance.errors import Group, groups_of
-from catenary.cases.studies.tolerance.samples import Bound, Samples, least_share, samples_of
-from catenary.cases.studies.tolerance.task import SamplesTable, ToleranceTask
+from catenary.cases.studies.tolerance.errors import (
+    Bound,
+    Group,
+    Samples,
+    SamplesTable,
+    ToleranceTask,
+    groups_of,
+    least_share,
+    samples_of,
+)
 from catenary.postproc.evaluate.wording import counted
 
 # A row for each thing that is measured of a run, such as a pantograph: its criterion and margin.

@@ -17,15 +17,16 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.jobs import STATISTICS
 from catenary.cases.studies.sweep.output import PLOTTED, key_in_words
-from catenary.cases.studies.uncertainty.estimates import quantile, student
 from catenary.cases.studies.uncertainty.evaluation import (
     Row,
     Uncertainty,
     evaluate,
     independent_runs,
+    quantile,
+    ranked_inputs,
+    student,
 )
 from catenary.cases.studies.uncertainty.run_table import RunTable, run_table, sampling_file
-from catenary.cases.studies.uncertainty.sensitivity import ranked_inputs
 from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Content, StudyTable, alike, write_files

@@ -16,8 +16,7 @@ from scipy.sparse.linalg import splu
 from catenary.base.mpi import MPI
 from catenary.cases.studies.waves.theory import HIGHEST
 from catenary.meshgen.build import make_mesh
-from catenary.meshgen.hardware import Droppers, SteadyArms, Supports
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import Droppers, Line, SteadyArms, Supports
 from catenary.meshgen.wires import Conductor, Piece, Profile, Section, Wire
 from catenary.postproc.report.pictures import figures
 from catenary.solver.effects.build_model import build
@@ -28,7 +27,7 @@ from catenary.solver.model.model import Block, Model, wire_elements
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Numerics, Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.waves.scattering import answer, change_of_wire, scattered
+from catenary.solver.waves.reflection import answer, change_of_wire, scattered
 
 # Wire to both sides of the obstacle, and stations before and behind it [m].
 HALF, STATION = 600.0, 60.0

@@ -6,8 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from catenary.cases.studies.waves.measured import Transmitted
-from catenary.cases.studies.waves.seen import EnergySeen, WavesSeen, places_of
+from catenary.cases.studies.waves.seen import EnergySeen, Transmitted, WavesSeen, places_of
 from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory
 from catenary.postproc.report.pictures import figures
 

@@ -13,7 +13,7 @@ from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.meshgen.wires import Role
 from catenary.postproc.report.pictures import figures
-from catenary.solver.ends.line_beyond import SIDES
+from catenary.solver.ends import SIDES
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Periodic
@@ -21,7 +21,7 @@ from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.elasticity import middle_span
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.waves.bloch import BlochWaves, bloch_waves, period_of
-from catenary.solver.waves.end_reflection import EndReflection, end_reflection
+from catenary.solver.waves.reflection import EndReflection, end_reflection
 
 # Forces are judged below this frequency (EN 50317) [Hz].
 HIGHEST = 20.0

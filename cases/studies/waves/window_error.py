@@ -17,8 +17,7 @@ from matplotlib.figure import Figure
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.mpi import MPI
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.problem import problem_of
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.studies.ensemble import Keeper
 from catenary.postproc.evaluate.filters import low_pass
 from catenary.postproc.record.run_watch import RunWatch

@@ -11,8 +11,13 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from catenary.postproc.record.snapshots.blocks import FIXED, Block
-from catenary.postproc.record.snapshots.field_kinds import USUAL_FIELDS, FieldKind, kinds_of
+from catenary.postproc.record.snapshots.contents import (
+    FIXED,
+    USUAL_FIELDS,
+    Block,
+    FieldKind,
+    kinds_of,
+)
 
 # Format of the file, its attribute ``format``.
 FORMAT = "catenary-fields-2"

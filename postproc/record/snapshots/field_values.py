@@ -7,18 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catenary.postproc.record.snapshots.blocks import Block, RecordedLine
-from catenary.postproc.record.snapshots.field_kinds import (
+from catenary.postproc.record.snapshots.contents import (
     ALONG,
     ASIDE,
     SLOPE,
     TURN,
     UP,
+    Block,
     FieldKind,
+    RecordedLine,
 )
 from catenary.postproc.record.snapshots.field_layout import Slots
 from catenary.solver.kernels import native
-from catenary.solver.model.axial_elements import rows_in_curve, slope_rows
+from catenary.solver.model.axial_motion import rows_in_curve, slope_rows
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,8 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.postproc.files.disk import broken_write
-from catenary.postproc.record.column_gather import ColumnGather
-from catenary.postproc.record.file_observer import FileObserver
-from catenary.postproc.record.snapshots.blocks import Block, RecordedLine, blocks_of
+from catenary.postproc.record.file_observer import ColumnGather, FileObserver
+from catenary.postproc.record.snapshots.contents import Block, RecordedLine, blocks_of
 from catenary.postproc.record.snapshots.field_layout import FieldRecord
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.postproc.record.snapshots.fields_file import FieldsFile

@@ -1,6 +1,6 @@
 """The attributes and tables of ``fields.h5``, declared once, and read against the declaration.
 
-As ``run_schema`` and ``validated_file`` do for ``run.h5``. Fields themselves are checked for kind
+As ``run_schema`` and ``result_tables`` do for ``run.h5``. Fields themselves are checked for kind
 and length here, and for their values snapshot by snapshot. Not collective.
 """
 
@@ -13,11 +13,10 @@ import numpy as np
 from h5py import h5d
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from catenary.postproc.files.hdf5.checked import HDF5_ERRORS
+from catenary.postproc.files.hdf5 import HDF5_ERRORS
 from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, largest
 from catenary.postproc.read.validation import read_attributes, table_values
-from catenary.postproc.record.snapshots.blocks import FIXED, OTHER_PARTS
-from catenary.postproc.record.snapshots.field_kinds import KINDS, FieldKind
+from catenary.postproc.record.snapshots.contents import FIXED, KINDS, OTHER_PARTS, FieldKind
 from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, SIZES, BlockTables
 
 # More snapshots or pantographs' numbers than any run has; nothing larger is read.

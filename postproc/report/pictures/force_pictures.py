@@ -16,7 +16,12 @@ from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures.envelope import thinned
+from catenary.postproc.report.pictures.along_track import (
+    mark_line,
+    panels_along_track,
+    title_of,
+    travelled,
+)
 from catenary.postproc.report.pictures.figures import (
     GREY,
     LIMIT,
@@ -28,13 +33,8 @@ from catenary.postproc.report.pictures.figures import (
     line,
     own_style,
     stacked,
+    thinned,
     tidy,
-)
-from catenary.postproc.report.pictures.marks import (
-    mark_line,
-    panels_along_track,
-    title_of,
-    travelled,
 )
 
 # Frequencies that a spectrum shows [Hz], and fewest records of one.

@@ -9,9 +9,9 @@ import numpy as np
 
 from catenary.postproc.evaluate.verdict import Criterion, judged_by, labels
 from catenary.postproc.evaluate.wording import decimals_that_tell
-from catenary.postproc.report.sections.section import EvaluatedRun, Section, Text, number
+from catenary.postproc.report.page import EvaluatedRun, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
-from catenary.postproc.standards.quantities import KMH, QUANTITIES
+from catenary.postproc.standards.rule_books import KMH, QUANTITIES
 
 _RELATIONS = {"<=": "≤", "<": "<", ">=": "≥", ">": ">"}
 NAN = float("nan")

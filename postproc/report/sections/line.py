@@ -11,14 +11,7 @@ from catenary.postproc.evaluate.wording import counted, wire_words
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import csv_tables
 from catenary.postproc.report.csv_tables import DropperRow
-from catenary.postproc.report.sections.section import (
-    EvaluatedRun,
-    Folded,
-    Picture,
-    Section,
-    Text,
-    number,
-)
+from catenary.postproc.report.page import EvaluatedRun, Folded, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
 
 
@@ -41,7 +34,7 @@ def in_motion(run: EvaluatedRun) -> Section:
 
 def _of_motion(run: EvaluatedRun) -> Iterator[Picture]:
     from catenary.postproc.report.pictures import line_pictures
-    from catenary.postproc.report.pictures.channel_pictures import channel_pictures
+    from catenary.postproc.report.pictures.line_pictures import channel_pictures
 
     results, statistics = run.results, run.statistics
     if results.n_rows("time") > 1 and statistics.supports.x.size:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.problem.problem import Problem, Simulated
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder
@@ -20,7 +19,7 @@ def _steady(laws: Simulated, problem: Problem) -> Simulated:
 
 
 def _damped(builder: ModelBuilder) -> None:
-    from catenary.solver.wind.drag import damping_blocks
+    from catenary.solver.wind import damping_blocks
 
     wind = builder.model.simulated.wind
     assert wind is not None
@@ -29,7 +28,7 @@ def _damped(builder: ModelBuilder) -> None:
 
 
 def _gusts(builder: ModelBuilder) -> None:
-    from catenary.solver.wind.drag import gust_loads
+    from catenary.solver.wind import gust_loads
 
     wind = builder.model.simulated.wind
     assert wind is not None

@@ -10,12 +10,12 @@ import numpy as np
 from catenary.meshgen.wires import End
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
-from catenary.solver.model import axial_elements, wire_ends
+from catenary.solver.model import axial_motion
 from catenary.solver.model.alike import alike
 from catenary.solver.model.link_directions import across_droppers
 from catenary.solver.model.links import PULLS, PUSHES, Direction, law, slips
 from catenary.solver.model.model import Block
-from catenary.solver.model.stations import SAME_STATION
+from catenary.solver.model.unknowns import SAME_STATION
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def _axial(builder: ModelBuilder) -> None:
         _add_bars(builder, wire.name)
     _add_pendulums(builder)
     builder.add_clamps("u")
-    builder.hold(wire_ends.held_along(builder.model), "u")
+    builder.hold(axial_motion.held_along(builder.model), "u")
 
 
 def _add_bars(builder: ModelBuilder, name: str) -> None:
@@ -49,8 +49,8 @@ def _add_bars(builder: ModelBuilder, name: str) -> None:
     model, data = builder.model, builder.problem.line.wire(name)
     if data.axial_stiffness is None:
         raise ValueError(f"{name} has no axial stiffness")
-    unknowns = axial_elements.unknowns_along(model, name)
-    rows = axial_elements.strain_rows(model, name)
+    unknowns = axial_motion.unknowns_along(model, name)
+    rows = axial_motion.strain_rows(model, name)
     left, _ = data.left_of(model.mesh.x(model.mesh.elements(name)))
     first, kind = alike(np.column_stack([rows, left]))
     rows, left = rows[first], left[first]
@@ -59,7 +59,7 @@ def _add_bars(builder: ModelBuilder, name: str) -> None:
         rows[:, :, None] * rows[:, None, :]
     )
     mass = np.zeros_like(stiffness)
-    mass[:, :2, :2] = axial_elements.bar_mass(left * length, data.mass_per_length)
+    mass[:, :2, :2] = axial_motion.bar_mass(left * length, data.mass_per_length)
     builder.add_block(Block(name, unknowns, kind, mass, stiffness, of_shape=True))
 
 
@@ -89,7 +89,9 @@ def _tensioners(builder: ModelBuilder) -> None:
     model, problem = builder.model, builder.problem
     tensioner = model.simulated.tensioner
     assert tensioner is not None
-    ends = [end for end in wire_ends.tensioned_ends(model) if not wire_ends.at_stop(model, end)]
+    ends = [
+        end for end in axial_motion.tensioned_ends(model) if not axial_motion.at_stop(model, end)
+    ]
     if not ends:
         return
     nodes = np.array([end.node for end in ends])
@@ -113,7 +115,7 @@ def _tensioners(builder: ModelBuilder) -> None:
         builder.add_links(stop, direction, laws)
 
 
-def _add_friction(builder: ModelBuilder, ends: list[wire_ends.WireEnd]) -> None:
+def _add_friction(builder: ModelBuilder, ends: list[axial_motion.WireEnd]) -> None:
     """Dry friction of wheels: a damper that slips where the tension leaves the band of a wheel that
     stands. While one stands it creeps, by ``CREEP`` where half the band is used."""
     model, problem = builder.model, builder.problem
@@ -125,7 +127,7 @@ def _add_friction(builder: ModelBuilder, ends: list[wire_ends.WireEnd]) -> None:
         [
             (
                 *tensioner.band(end.wire, problem.line.wire(end.wire), problem.gravity),
-                wire_ends.tension_at_rest(model, end),
+                axial_motion.tension_at_rest(model, end),
             )
             for end in ends
         ]

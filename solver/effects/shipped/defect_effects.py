@@ -14,6 +14,7 @@ from catenary.solver.effects.shipped import hardware_effects  # noqa: F401  (bui
 from catenary.solver.model.link_directions import at_places
 from catenary.solver.model.model import Block
 from catenary.solver.problem.defects import (
+    BentWire,
     HardSpot,
     Kink,
     LooseClamp,
@@ -21,9 +22,7 @@ from catenary.solver.problem.defects import (
     WornWire,
     WrongTension,
 )
-from catenary.solver.problem.irregularities import BentWire
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.problem.problem import Problem, Simulated
 
 register(
     Effect(

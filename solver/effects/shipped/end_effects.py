@@ -13,8 +13,7 @@ from catenary.solver.effects.shipped import defect_effects, lateral_effects  # n
 from catenary.solver.model.model import Block, Model
 from catenary.solver.problem.ends import AbsorbingLayer, Periodic
 from catenary.solver.problem.integrator_parameters import integration_of
-from catenary.solver.problem.problem import Problem, steps_of
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.problem.problem import Problem, Simulated, steps_of
 
 if TYPE_CHECKING:
     from catenary.solver.model.builder import ModelBuilder
@@ -72,8 +71,7 @@ def _going_on(laws: Simulated, problem: Problem) -> Simulated:
 
 def _lines_beyond(builder: ModelBuilder) -> None:
     # Compiled loops and transforms, which lines that do not go on need not import.
-    from catenary.solver.ends.line_beyond import line_beyond
-    from catenary.solver.ends.periodic_end import StepSums, periodic_end
+    from catenary.solver.ends import StepSums, line_beyond, periodic_end
     from catenary.solver.model.loads import MemoryLoad
 
     model, problem = builder.model, builder.problem

@@ -14,7 +14,7 @@ from catenary.solver.model.links import Direction, law
 from catenary.solver.model.model import Block
 
 if TYPE_CHECKING:
-    from catenary.meshgen.hardware import SteadyArms
+    from catenary.meshgen.line import SteadyArms
     from catenary.solver.model.builder import ModelBuilder
 
 PLANE = ("v", "theta_z")

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
-from catenary.solver.problem.problem import Problem
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.problem.problem import Problem, Simulated
 
 
 def _suspended(laws: Simulated, problem: Problem) -> Simulated:

@@ -15,8 +15,7 @@ from dataclasses import replace
 
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import hardware_effects  # noqa: F401  (built before)
-from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.problem.simulated import Simulated
+from catenary.solver.problem.problem import Damping, Problem, Simulated
 from catenary.solver.problem.watched_links import UPLIFT_STOPS
 
 NAME = "stiff_link_damping"

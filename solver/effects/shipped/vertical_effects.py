@@ -10,12 +10,11 @@ import numpy as np
 from catenary.meshgen.wires import Profile
 from catenary.solver.effects.effect import Effect, Limit, register
 from catenary.solver.problem.contact_laws import KinematicLaw
-from catenary.solver.problem.incidents import DropperBreak, LineIncident, TensionLoss
-from catenary.solver.problem.problem import Problem, slowest_wave_speed
-from catenary.solver.problem.simulated import Simulated, TargetHeight
+from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
+from catenary.solver.problem.problem import Problem, Simulated, TargetHeight, slowest_wave_speed
 
 if TYPE_CHECKING:
-    from catenary.meshgen.hardware import SteadyArms
+    from catenary.meshgen.line import SteadyArms
     from catenary.solver.model.builder import ModelBuilder
 
 

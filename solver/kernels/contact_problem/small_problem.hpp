@@ -1,7 +1,7 @@
 #pragma once
 // The small dense problem of a step: contact forces and switching links, a linear complementarity
 // problem of their influence matrix, with contact laws, their tangents and reported forces. For the
-// equations see solver/contact_problem/complementarity.py.
+// equations see solver/contact_problem/coupling.py.
 #include <optional>
 
 #include "base/arrays.hpp"

@@ -1,6 +1,6 @@
 #pragma once
 // Pantographs stepped by Newmark's method: the row that drives a step, state, strips, contact. With
-// a regulated lift, filter, samples, gains, limits, delay (mbs/control.py); laws that are not
+// a regulated lift, filter, samples, gains, limits, delay (mbs/head/laws.py); laws that are not
 // linear, tables that settle within a step (mbs/head/laws.py); and the lowering under way until the
 // head is caught (mbs/lowering.py).
 //

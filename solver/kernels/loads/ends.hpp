@@ -1,6 +1,6 @@
 #pragma once
 // Ends of a line: dynamic condensation of the spans beyond them, Schur complements at frequencies
-// (half_lines.py), and sums over their past (end_memory.py), by Fourier transforms in place whose
+// (ends.py), and sums over their past (line_loads.py), by Fourier transforms in place whose
 // length is a power of two.
 #include <complex>
 #include <span>

@@ -1,6 +1,6 @@
 #pragma once
 // Loads in time on the unknowns that a rank solves for, see line_loads.py; amplitudes of
-// gusts along a line, and the waves that they make, see gust_field.py.
+// gusts along a line, and the waves that they make, see wind.py.
 #include "loads/ends.hpp"
 
 namespace catenary {

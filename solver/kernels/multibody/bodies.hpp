@@ -1,7 +1,7 @@
 #pragma once
 // Rigid bodies in space: where n bodies are and how they move, the frame at rest being one more;
 // and rows of joints and lines of forces between them, all of a system at once. These know nothing
-// of joints or forces by name; see mbs/rigid/arrays.py.
+// of joints or forces by name; see mbs/rigid/joints.py.
 #include <array>
 #include <vector>
 
@@ -44,7 +44,7 @@ struct BodyProduct {
     Vector3 normal;            ///< in the body's axes
     Vector3 at_start, at_end;  ///< in axes of `start` and `end` [m]
 };
-/// Results of m products, as in `Quantity` of mbs/rigid/kinematics.py.
+/// Results of m products, as in `Quantity` of mbs/rigid/bodies.py.
 struct BodyProducts {
     std::span<double> value;  ///< (m,)
     Array2<double> jacobian;  ///< (m, 6 n)

@@ -111,7 +111,7 @@ constexpr bool holds(const Mask& mask, const Mask& other) {
     return true;
 }
 
-/// Sparsity of a station's blocks of rows, or of factors. See `station_layout.py`.
+/// Sparsity of a station's blocks of rows, or of factors. See `station_products.py`.
 struct Layout {
     int unknowns = 0;
     Mask own{};               ///< of a row's diagonal block; of factors S^-1 and -B^T S^-1

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from catenary.solver.contact.forces_on_line import ForcesOnLine
     from catenary.solver.contact.pantographs import Pantographs
-    from catenary.solver.problem.simulated import Simulated
+    from catenary.solver.problem.problem import Simulated
     from catenary.solver.schemes.scheme import Scheme
 
 PANTOGRAPH = "pantograph"

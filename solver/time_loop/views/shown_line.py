@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.solver.contact.followed_links import FollowedLinks
+from catenary.solver.contact.forces_on_line import FollowedLinks
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.window.moving_columns import Columns, columns_of, widen

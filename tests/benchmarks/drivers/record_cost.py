@@ -20,7 +20,7 @@ from mpi4py import MPI
 from catenary.cases.run.runner import run_case
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.scene import problem_of
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop import march
 from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView

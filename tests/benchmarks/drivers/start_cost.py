@@ -18,7 +18,7 @@ from step_cost import peak_memory, room
 
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.scene import problem_of
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
 

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
-from catenary.cases.scene.problem import problem_of
+from catenary.cases.scene.scene import problem_of
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute

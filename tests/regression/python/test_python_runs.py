@@ -28,7 +28,7 @@ from program import catenary as program
 from scenes import with_words
 
 import catenary
-from catenary.cases.scene.input.toml_input import parse_assignment
+from catenary.cases.scene.input.case_files import parse_assignment
 from catenary.postproc.read.results import Results
 
 pytestmark = pytest.mark.usefixtures("examined_here")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.mbs.rigid.least_squares import least_squares, null_space
+from catenary.mbs.rigid.system import least_squares, null_space
 
 EPS = np.finfo(float).eps
 

@@ -11,15 +11,14 @@ from scipy.interpolate import CubicSpline
 
 from catenary import RunBroken
 from catenary.mbs.head.laws import Law
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
-from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import Head
 from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
 from catenary.mbs.mechanism.reduction import ReducedMechanism
-from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
+from catenary.mbs.vehicle import BaseMotion, Harmonic, VehicleMotion
 
 EPS = np.finfo(float).eps
 DT, BETA, GAMMA = 2e-3, 0.3, 0.55

@@ -9,7 +9,7 @@ from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.head.stepping import Raising, Stepping
 from catenary.mbs.lowering import LoweredPantograph, Lowering
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.vehicle.base_motion import BaseMotion, Harmonic, VehicleMotion
+from catenary.mbs.vehicle import BaseMotion, Harmonic, VehicleMotion
 
 DATA = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
 STATIC, DT = 120.0, 1e-3

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.mbs.head.head_arrays import drive_width, named
 from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.interface import drive_width, named
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 

@@ -12,8 +12,7 @@ from measuring import check
 from scipy.interpolate import CubicSpline
 
 from catenary import InputError
-from catenary.mbs.rigid.arrays import Joint
-from catenary.mbs.rigid.bodies import SPACE, Body, Motion
+from catenary.mbs.rigid.bodies import SPACE, Body, Motion, stacked
 from catenary.mbs.rigid.forces import (
     Actuator,
     BumpStop,
@@ -25,6 +24,7 @@ from catenary.mbs.rigid.forces import (
 )
 from catenary.mbs.rigid.joints import (
     Fixed,
+    Joint,
     PointOnCurve,
     PointOnLine,
     PrescribedAngle,
@@ -34,7 +34,6 @@ from catenary.mbs.rigid.joints import (
     RevolutePrismatic,
     Spherical,
 )
-from catenary.mbs.rigid.kinematics import stacked
 from catenary.mbs.rigid.system import System, independent_rows
 
 EPS = np.finfo(float).eps

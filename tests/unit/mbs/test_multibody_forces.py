@@ -8,7 +8,7 @@ from body_mechanics import generalised, stored_energy
 from measuring import check
 
 from catenary import InputError
-from catenary.mbs.rigid.bodies import SPACE, Body, Motion, initial_motion
+from catenary.mbs.rigid.bodies import SPACE, Body, Motion, initial_motion, point
 from catenary.mbs.rigid.forces import (
     Actuator,
     BumpStop,
@@ -18,7 +18,6 @@ from catenary.mbs.rigid.forces import (
     SpringDamper,
     Table,
 )
-from catenary.mbs.rigid.kinematics import point
 from catenary.mbs.rigid.system import System
 
 EPS = np.finfo(float).eps

@@ -10,11 +10,11 @@ from measuring import check
 from scipy.spatial.transform import Rotation
 
 from catenary import InputError
-from catenary.mbs.rigid.arrays import FlatRows, Joint
 from catenary.mbs.rigid.bodies import (
     SPACE,
     Body,
     Motion,
+    Quantity,
     initial_motion,
     normalised,
     rotation_matrix,
@@ -22,6 +22,8 @@ from catenary.mbs.rigid.bodies import (
 from catenary.mbs.rigid.joints import (
     Constant,
     Fixed,
+    FlatRows,
+    Joint,
     PointOnCurve,
     PointOnLine,
     PrescribedAngle,
@@ -32,7 +34,6 @@ from catenary.mbs.rigid.joints import (
     Spherical,
     steady,
 )
-from catenary.mbs.rigid.kinematics import Quantity
 
 EPS = np.finfo(float).eps
 TIME = 0.7

@@ -10,13 +10,7 @@ from measuring import check
 from catenary import InputError, RunBroken
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, Gravity, PointForce, SpringDamper
-from catenary.mbs.rigid.joints import (
-    Constant,
-    PrescribedPoint,
-    Prismatic,
-    Revolute,
-    Spherical,
-)
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint, Prismatic, Revolute, Spherical
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium, held_force
 from catenary.mbs.rigid.system import System
 

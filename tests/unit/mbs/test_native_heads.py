@@ -7,9 +7,9 @@ import gc
 import numpy as np
 import pytest
 
-from catenary.mbs.head.head_arrays import drive_width, named
 from catenary.mbs.head.newmark_head import head_of
 from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.interface import drive_width, named
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.kernels import native

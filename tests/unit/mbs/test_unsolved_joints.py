@@ -8,9 +8,8 @@ import pytest
 from catenary.base.errors import NotConverged
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Gravity
-from catenary.mbs.rigid.implicit_steps import Stepper
+from catenary.mbs.rigid.implicit_steps import Augmented, Partitioned, Stepper
 from catenary.mbs.rigid.joints import Revolute
-from catenary.mbs.rigid.step_solvers import Augmented, Partitioned
 from catenary.mbs.rigid.system import System
 
 # A pendulum of 1 m that is let go from level.

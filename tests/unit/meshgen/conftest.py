@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.meshgen.hardware import DropperKind, SteadyArm
+from catenary.meshgen.line import DropperKind, SteadyArm
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
 

@@ -13,8 +13,7 @@ import pytest
 from mpi4py import MPI
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.hardware import DropperKind, SteadyArm
-from catenary.meshgen.line import Line
+from catenary.meshgen.line import DropperKind, Line, SteadyArm
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line as make_line_of
 from catenary.meshgen.topologies.line_data import LineData
@@ -22,11 +21,11 @@ from catenary.meshgen.wires import Conductor
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.record.snapshots.blocks import RecordedLine
+from catenary.postproc.record.snapshots.contents import RecordedLine
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.statics.elasticity import Elasticity
-from catenary.solver.statics.form_finding.equilibrium import Equilibrium
+from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 

@@ -13,16 +13,15 @@ import pytest
 from scipy import signal
 
 import catenary
-from catenary.postproc.channels.line_record import LineRecord
+from catenary.postproc.channels.header import LineRecord
 from catenary.postproc.evaluate import filters, passages
 from catenary.postproc.evaluate.statistics import slack_times
-from catenary.postproc.files.hdf5 import table_rows
-from catenary.postproc.files.kept_extremes import store_extremes
+from catenary.postproc.files import hdf5
+from catenary.postproc.files.committed_rows import store_extremes
 from catenary.postproc.files.run_schema import COMPLETE
-from catenary.postproc.read import records
-from catenary.postproc.read.line_of_run import in_stretch
-from catenary.postproc.read.results import Results
-from catenary.postproc.report.pictures import envelope
+from catenary.postproc.read import validation
+from catenary.postproc.read.results import Results, in_stretch
+from catenary.postproc.report.pictures import figures
 
 
 @pytest.mark.parametrize("shape", [(1,), (2,), (300,), (150_000,), (70_000, 2)])
@@ -43,8 +42,8 @@ def test_filters_in_blocks_are_those_of_scipy(
 def test_columns_and_extremes_are_those_of_the_whole_table(
     run_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(table_rows, "BLOCK_BYTES", 1e5)
-    monkeypatch.setattr(table_rows, "_SLICE", 1000)
+    monkeypatch.setattr(hdf5, "BLOCK_BYTES", 1e5)
+    monkeypatch.setattr(hdf5, "_SLICE", 1000)
     with Results(run_folder) as results:
         for name in ("contact_force", "contact_position", "arm_uplift", "dropper_force"):
             whole = results.channel(name)
@@ -65,8 +64,8 @@ def test_slack_droppers_are_those_of_whole_tables(
     tmp_path: Path, march: Any, record_run: Any, monkeypatch: pytest.MonkeyPatch, record: LineRecord
 ) -> None:
     """Before the last pantograph and in or after its passage, read in many blocks."""
-    monkeypatch.setattr(table_rows, "BLOCK_BYTES", 1e5)
-    monkeypatch.setattr(table_rows, "COLUMNS_AT_ONCE", 7)
+    monkeypatch.setattr(hdf5, "BLOCK_BYTES", 1e5)
+    monkeypatch.setattr(hdf5, "COLUMNS_AT_ONCE", 7)
     record_run(tmp_path / "run.h5", march, record=record)
     with Results(tmp_path) as results:
         found, x = passages.slack_droppers(results)["all"], results.line("dropper_x")
@@ -86,7 +85,7 @@ def test_a_thinned_curve_keeps_every_peak() -> None:
     y = np.random.default_rng(5).normal(size=1_000_003)
     y[[17, 500_000, 1_000_002]] = 50.0, -60.0, 70.0
     y[200_000:300_000] = np.nan
-    chosen = envelope.thinned(y)
+    chosen = figures.thinned(y)
     assert isinstance(chosen, np.ndarray) and chosen.size < 12_000
     assert {0, 17, 500_000, 1_000_002} <= set(chosen.tolist())
     assert (np.diff(chosen) > 0).all()
@@ -98,7 +97,7 @@ def test_a_thinned_curve_keeps_every_peak() -> None:
             continue
         assert np.nanmax(shown) >= np.nanmax(y[inner])
         assert np.nanmin(shown) <= np.nanmin(y[inner])
-    assert envelope.thinned(y[:100]) == slice(None)
+    assert figures.thinned(y[:100]) == slice(None)
 
 
 REPORT = """
@@ -194,20 +193,20 @@ def test_what_a_window_left_unwritten_is_not_read(compression: str | None, tmp_p
         for row in range(n_rows):
             table[row, row : row + band] = float(row)
         counted = Read(table)
-        assert records.valid_rows(counted, n_rows, 1e6, True) == n_rows
+        assert validation.valid_rows(counted, n_rows, 1e6, True) == n_rows
         # Blocks of a few hundred columns that meet the band, of a table that takes 64 MB.
         assert 0 < counted.n_values < 0.6 * n_rows * n_columns
-        assert records.valid_rows(table, n_rows, 1e6, False) == 0, "NaN where none may be"
+        assert validation.valid_rows(table, n_rows, 1e6, False) == 0, "NaN where none may be"
         table[1500, 3900] = 1e7
-        assert records.valid_rows(table, n_rows, 1e6, True) == 1500
+        assert validation.valid_rows(table, n_rows, 1e6, True) == 1500
 
 
 def test_written_blocks_hold_all_that_a_window_wrote(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They are the whole table but for blocks that are NaN."""
-    monkeypatch.setattr(table_rows, "COLUMNS_AT_ONCE", 64)
-    monkeypatch.setattr(table_rows, "BLOCK_BYTES", 5e5)
+    monkeypatch.setattr(hdf5, "COLUMNS_AT_ONCE", 64)
+    monkeypatch.setattr(hdf5, "BLOCK_BYTES", 5e5)
     folder = tmp_path / "run"
     catenary.run(
         catenary.load("ambrosio2012").replace(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from measuring import check
 
-from catenary.postproc.evaluate import derivatives
+from catenary.postproc.evaluate import statistics
 from catenary.postproc.evaluate.statistics import contact_statistics
 
 DT, N = 2e-3, 4000
@@ -27,7 +27,7 @@ def test_statistics_change_as_differences_of_them(name: str) -> None:
     position, evaluation = 70.0 * DT * np.arange(N), (100.0, 400.0)
     within = (position >= evaluation[0]) & (position <= evaluation[1])
     force, by_force = 120.0 + records(1), records(2)
-    found = derivatives.of_force(force, by_force[:, None], within, DT)
+    found = statistics.force_derivatives(force, by_force[:, None], within, DT)
     step = 1e-6
     both = [
         getattr(contact_statistics("", position, own, own, DT, evaluation), NAMES[name])
@@ -46,8 +46,8 @@ def test_records_are_compared_at_equal_places() -> None:
     by_force = (30.0 * number * np.cos(number * place) * place / speed)[:, None]
     within = (place >= 100.0) & (place <= 400.0)
     by_place = (place / speed / speed)[:, None]  # per m/s, over the speed
-    found = derivatives.of_force(force, by_force, within, DT, by_place)
-    moved = derivatives.of_force(force, by_force, within, DT)
+    found = statistics.force_derivatives(force, by_force, within, DT, by_place)
+    moved = statistics.force_derivatives(force, by_force, within, DT)
     # Differences of the fourth order of a wave of 714 records: (2 pi / 357)^4 / 30 of its slope.
     check("std", found.std, 0.0, within=1e-6)
     check("mean", found.mean, 0.0, within=1e-6)
@@ -57,11 +57,11 @@ def test_records_are_compared_at_equal_places() -> None:
 def test_the_largest_of_several_columns_changes_as_its_record() -> None:
     values = np.array([[1.0, 2.0], [5.0, 3.0], [4.0, 4.5]])
     by_values = np.arange(12.0).reshape(3, 2, 2)
-    assert derivatives.of_largest(values, by_values).tolist() == by_values[1, :, 0].tolist()
-    assert np.isnan(derivatives.of_largest(values[:, :0], by_values[..., :0])).all()
+    assert statistics.largest_derivatives(values, by_values).tolist() == by_values[1, :, 0].tolist()
+    assert np.isnan(statistics.largest_derivatives(values[:, :0], by_values[..., :0])).all()
 
 
 def test_a_force_that_never_changes_has_no_sigma_that_does() -> None:
     flat = np.full(N, 100.0)
-    found = derivatives.of_force(flat, records(3)[:, None], np.ones(N, dtype=bool), DT)
+    found = statistics.force_derivatives(flat, records(3)[:, None], np.ones(N, dtype=bool), DT)
     assert np.isfinite(found.std).all()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.postproc.report.pictures.envelope import MOST_POINTS, thinned_ranges
+from catenary.postproc.report.pictures.figures import MOST_POINTS, thinned_ranges
 
 
 def test_few_ranges_are_drawn_as_they_are() -> None:

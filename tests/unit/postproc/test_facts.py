@@ -24,7 +24,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.postproc.channels.facts import FACTS, WIRE, facts_of
 from catenary.postproc.evaluate.error_indicators import as_table, indicate
 from catenary.postproc.evaluate.statistics import evaluate
-from catenary.postproc.files.hdf5.checked import seal_arrays
+from catenary.postproc.files.hdf5 import seal_arrays
 from catenary.postproc.read.results import Results
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw
 from catenary.solver.problem.problem import Damping, Placement, Problem

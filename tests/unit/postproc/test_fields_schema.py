@@ -14,7 +14,7 @@ import pytest
 from studies import few
 
 from catenary import InputError
-from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.film_data import Snapshots
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from catenary.postproc.report.pictures import figures, marks
+from catenary.postproc.report.pictures import along_track, figures
 
 
 def drawn(figure: Figure) -> Image.Image:
@@ -110,7 +110,7 @@ def test_colours_are_as_given() -> None:
 def test_ranges_too_small_for_a_line_are_dashes() -> None:
     _, (axes,) = figures.stacked(3.0, 1)
     x = np.array([1.0, 2.0, 3.0, 4.0])
-    marks.draw_ranges(
+    along_track.draw_ranges(
         axes, x, np.array([0.0, 60.0, 59.5, 60.0]), np.array([200.0, 60.0, 60.0, 63.0])
     )
     _, dashes = axes.lines

@@ -25,15 +25,13 @@ from PIL import Image, ImageSequence
 from catenary import InputError, RunBroken
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.shape import HEAD, shape_of
-from catenary.postproc.files.hdf5.checked import seal_attributes, set_attribute
-from catenary.postproc.film import animate, drawing, projection, scenery, video
+from catenary.postproc.files.hdf5 import seal_attributes, set_attribute
+from catenary.postproc.film import animate, drawing, scenery, video
 from catenary.postproc.film.animate import Pictures
-from catenary.postproc.film.chart import ForceChart
-from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.drawing import ForceChart
+from catenary.postproc.film.film_data import Snapshots, film_data
 from catenary.postproc.film.options import FilmOptions, View
-from catenary.postproc.film.projection import Projection
-from catenary.postproc.film.scenery import FORCES, PANTOGRAPHS, TRAIN, Scenery
-from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.film.scenery import FORCES, PANTOGRAPHS, TRAIN, Projection, Scenery
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
@@ -88,14 +86,14 @@ def pictures_of(folder: Path, options: FilmOptions, shapes: Any = None) -> Itera
     ("value", "expected"), [(1.0, 1.0), (1.99, 1.5), (7.9, 6.0), (62.0, 60.0), (0.45, 0.4)]
 )
 def test_factors_are_round_and_never_larger(value: float, expected: float) -> None:
-    assert projection.round_down(value) == pytest.approx(expected)
+    assert scenery.round_down(value) == pytest.approx(expected)
 
 
 def test_the_largest_uplift_stays_between_the_wires(folder: Path) -> None:
     with pictures_of(folder, FilmOptions()) as made:
         scale, data = made.drawing._projection.scale, made._scenery.data
         largest = made.drawing._colours.high
-    between = projection.room_between(data)
+    between = scenery.room_between(data)
     assert 0.2 * between * scale.size < scale.motion * largest < 0.5 * between * scale.size
 
 
@@ -118,7 +116,7 @@ def test_snapshots_are_those_of_the_fields(folder: Path, make_march: Any) -> Non
 
 def test_each_view_shows_its_two_directions() -> None:
     rest, moved = np.array([[7.0, 0.2, 5.0]]), np.array([[0.5, -0.01, 0.02]])
-    scale = projection.Scale(10.0, 50.0)
+    scale = scenery.Scale(10.0, 50.0)
     seen = {view: Projection(view, scale, 4.0).seen(rest, moved, -10.0)[0] for view in View}
     np.testing.assert_allclose(seen[View.SIDE], [7.5, 51.0])
     # To the left is up from above, and farther away from the right and above.
@@ -702,8 +700,8 @@ def test_droppers_that_are_missing_or_broke_are_not_drawn(folder: Path) -> None:
 def test_numbers_below_a_scale_of_colours_do_not_touch(
     folder: Path, low: float, numbers: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ends = projection.Colours(2, "uplift", 1e-3 * low, 0.085)
-    monkeypatch.setattr(projection.Picture, "colours", lambda *_: ends)
+    ends = scenery.Colours(2, "uplift", 1e-3 * low, 0.085)
+    monkeypatch.setattr(scenery.Picture, "colours", lambda *_: ends)
     with pictures_of(folder, FilmOptions()) as made:
         made.drawing.pixels()
         below = made.drawing.figure.axes[2].xaxis

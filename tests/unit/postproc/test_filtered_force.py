@@ -15,7 +15,7 @@ from scipy import signal
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.statistics import evaluate
-from catenary.postproc.files.filtered_force import PATH, ForceFilter
+from catenary.postproc.files.committed_rows import PATH, ForceFilter
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.results import Run

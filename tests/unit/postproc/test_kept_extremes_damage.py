@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc.files.hdf5.checked import ARRAYS_SUM, seal_arrays, sum_is_kept
-from catenary.postproc.files.kept_extremes import ROWS, drop_extremes, extremes_at, store_extremes
+from catenary.postproc.files.committed_rows import ROWS, drop_extremes, extremes_at, store_extremes
+from catenary.postproc.files.hdf5 import ARRAYS_SUM, seal_arrays, sum_is_kept
 
 CHANNELS = ("arm_uplift", "dropper_force")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from studies import few
 
-from catenary.postproc.channels.line_record import GZIP, LineRecord, from_table, record_words
+from catenary.postproc.channels.header import GZIP, LineRecord, from_table, record_words
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.postproc.channels.line_record import LineRecord
-from catenary.postproc.record.line_rows import LineGather
+from catenary.postproc.channels.header import LineRecord
+from catenary.postproc.record.recorder import LineGather
 from catenary.solver.time_loop.views.channels import TrainLayout
 from catenary.solver.time_loop.views.observers import Stage
 from catenary.solver.window.moving_columns import Columns, MovingColumns

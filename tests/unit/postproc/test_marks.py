@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from catenary.postproc.report.pictures.marks import mark_line
+from catenary.postproc.report.pictures.along_track import mark_line
 
 
 class Told:

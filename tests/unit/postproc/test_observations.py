@@ -24,12 +24,10 @@ from catenary.postproc.evaluate.observations import (
     wire_at_rest,
 )
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of
-from catenary.postproc.files.hdf5.checked import ATTRIBUTE_SUMS
-from catenary.postproc.read.line_of_run import ContactProfile
-from catenary.postproc.read.results import Results
+from catenary.postproc.files.hdf5 import ATTRIBUTE_SUMS
+from catenary.postproc.read.results import ContactProfile, Results
 from catenary.postproc.report.report import write_report
-from catenary.postproc.standards.library import shipped
-from catenary.postproc.standards.quantities import KMH, QUANTITIES
+from catenary.postproc.standards.rule_books import KMH, QUANTITIES, shipped
 from catenary.solver.effects.all_effects import registry
 from catenary.solver.problem.watched_links import TENSION
 

@@ -10,16 +10,9 @@ from matplotlib.figure import Figure
 from catenary.postproc.evaluate import statistics
 from catenary.postproc.files.own_files import PICTURES
 from catenary.postproc.read.results import Results
+from catenary.postproc.report.page import EvaluatedRun, Folded, Picture, Section, SectionEntry, Text
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.report import SECTIONS, drawings, write_report
-from catenary.postproc.report.sections.section import (
-    EvaluatedRun,
-    Folded,
-    Picture,
-    Section,
-    SectionEntry,
-    Text,
-)
 from catenary.postproc.report.study_table import texts_table
 
 

@@ -19,10 +19,9 @@ from matplotlib.colors import to_rgb
 from studies import few
 
 from catenary import RunBroken
-from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.film_data import Snapshots, film_data
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import MOTIONS
-from catenary.postproc.film.snapshots import Snapshots
 from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder

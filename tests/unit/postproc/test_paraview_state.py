@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.postproc.paraview import state
+from catenary.postproc.paraview import open_in_paraview
 
 # What starts a program is run by processes of its own.
 pytestmark = pytest.mark.process
@@ -38,7 +38,7 @@ def test_the_state_stands_beside_the_script(
 ) -> None:
     monkeypatch.setenv("DISPLAY", ":7")
     on_the_path(tmp_path, monkeypatch, pvpython=WRITES)
-    made, why = state.write_state(script)
+    made, why = open_in_paraview.write_state(script)
     assert made == tmp_path / "view.pvsm" and made.read_text() == "<ParaView/>\n" and why == ""
 
 
@@ -46,11 +46,11 @@ def test_without_a_screen_one_is_made(
     script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr(state.sys, "platform", "linux")
+    monkeypatch.setattr(open_in_paraview.sys, "platform", "linux")
     # A screen that starts anew while ParaView is not connected refuses it now and then.
     stays = 'case "$*" in *-noreset*) ;; *) exit 4 ;; esac; '
     on_the_path(tmp_path, monkeypatch, pvpython="exit 3", xvfb_run=stays + WRITES)
-    assert state.write_state(script)[0] == tmp_path / "view.pvsm"
+    assert open_in_paraview.write_state(script)[0] == tmp_path / "view.pvsm"
 
 
 @pytest.mark.parametrize(
@@ -70,10 +70,10 @@ def test_where_there_is_none_one_sentence_says_why(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr(state.sys, "platform", "linux")
+    monkeypatch.setattr(open_in_paraview.sys, "platform", "linux")
     (tmp_path / "view.pvsm").write_text("an earlier one")
     on_the_path(tmp_path, monkeypatch, **programs)
-    made, why = state.write_state(script)
+    made, why = open_in_paraview.write_state(script)
     assert made is None and told in why and "no state is written" in why
     assert (tmp_path / "view.pvsm").read_text() == "an earlier one"
     assert not list(tmp_path.glob(".view*"))

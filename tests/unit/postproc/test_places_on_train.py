@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.postproc.channels.places_on_train import in_sentence, places_on_train
+from catenary.postproc.channels.header import in_sentence, places_on_train
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,7 @@ import pyvista
 from watched_fields import BLOCKS, blocks_at, times_in, watch
 
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
-from catenary.postproc.record.snapshots.blocks import ARMS, MASTS, blocks_of
-from catenary.postproc.record.snapshots.field_kinds import FIELDS
+from catenary.postproc.record.snapshots.contents import ARMS, FIELDS, MASTS, blocks_of
 from catenary.postproc.record.snapshots.field_layout import BlockTables, Course, FieldRecord
 from catenary.postproc.record.snapshots.field_values import bending_moment
 from catenary.postproc.record.snapshots.fields import FieldRecorder

@@ -11,7 +11,7 @@ import h5py
 import pytest
 
 from catenary import RunBroken
-from catenary.base.whole_files import part_of
+from catenary.base.files import part_of
 from catenary.postproc.files.disk import broken_write
 from catenary.postproc.files.disk_errors import reason, remedy
 from catenary.postproc.files.own_files import (

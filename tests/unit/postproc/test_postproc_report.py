@@ -19,10 +19,9 @@ import catenary.postproc.report.page
 from catenary import InputError
 from catenary.postproc.evaluate.compare import compare
 from catenary.postproc.read.results import Results
-from catenary.postproc.report.page import page, pdf
+from catenary.postproc.report.page import Section, Text, page, pdf
 from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
-from catenary.postproc.report.sections.section import Section, Text
 from catenary.postproc.report.study_table import texts_table
 
 TEMPLATES = Path(catenary.postproc.report.page.__file__).parent / "templates"

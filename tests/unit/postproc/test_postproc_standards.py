@@ -22,9 +22,14 @@ from catenary.postproc.evaluate.verdict import (
     quantities_of,
     verdict,
 )
-from catenary.postproc.standards.book import Conditions
-from catenary.postproc.standards.library import book_named, books_of_entries, shipped
-from catenary.postproc.standards.quantities import PANTOGRAPH, QUANTITIES
+from catenary.postproc.standards.rule_books import (
+    PANTOGRAPH,
+    QUANTITIES,
+    Conditions,
+    book_named,
+    books_of_entries,
+    shipped,
+)
 
 # A run that satisfies every book; the wave speed is in km/h, strips are 1.2 m long.
 GOOD = {

@@ -18,10 +18,10 @@ from catenary.postproc.evaluate import statistics
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of
 from catenary.postproc.read.results import Results
 from catenary.postproc.report import page as pages
+from catenary.postproc.report.page import EvaluatedRun
 from catenary.postproc.report.pictures import figures, force_pictures, interactive, line_pictures
 from catenary.postproc.report.report import SECTIONS, write_report
 from catenary.postproc.report.sections import acceptance, dynamics
-from catenary.postproc.report.sections.section import EvaluatedRun
 
 
 def evaluated(results: Results) -> EvaluatedRun:

@@ -10,9 +10,7 @@ import pytest
 
 from catenary import InputError
 from catenary.postproc.evaluate.observations import OBSERVED
-from catenary.postproc.standards.book import Conditions, book_of
-from catenary.postproc.standards.library import shipped
-from catenary.postproc.standards.quantities import QUANTITIES
+from catenary.postproc.standards.rule_books import QUANTITIES, Conditions, book_of, shipped
 
 BOOK: dict[str, Any] = {
     "name": "mine",

@@ -10,9 +10,9 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
+from catenary.postproc.files.hdf5 import FORMAT_BOUNDS
 from catenary.postproc.files.run_schema import COMPLETE, RUNNING
-from catenary.postproc.read.validated_file import opened
+from catenary.postproc.read.result_tables import opened
 
 ROWS = 200
 # What the run does after the file has been opened: so many chunks that HDF5 divides their index.

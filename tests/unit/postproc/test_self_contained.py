@@ -15,11 +15,11 @@ from h5py import h5d, h5p, h5s, h5t
 from studies import few
 
 from catenary import InputError
-from catenary.base.whole_files import new_part
+from catenary.base.files import new_part
 from catenary.postproc.files import disk
 from catenary.postproc.files.committed_rows import fault_to_continue
-from catenary.postproc.files.hdf5.self_contained import open_own
-from catenary.postproc.film.snapshots import Snapshots
+from catenary.postproc.files.hdf5 import open_own
+from catenary.postproc.film.film_data import Snapshots
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 

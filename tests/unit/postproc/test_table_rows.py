@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from damaging import spoil_chunk
 
-from catenary.postproc.files.hdf5.checked import FORMAT_BOUNDS
-from catenary.postproc.files.hdf5.table_rows import DamagedClock, rows_before, shorten
+from catenary.postproc.files.hdf5 import FORMAT_BOUNDS, DamagedClock, rows_before, shorten
 
 N, COLUMNS, CHUNK = 1050, 9, (100, 5)
 PACKED: dict[str, Any] = {"compression": "gzip", "shuffle": True}

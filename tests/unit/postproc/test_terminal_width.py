@@ -14,7 +14,7 @@ import termios
 import pytest
 from program import ENTRY
 
-from catenary.postproc.evaluate.terminal_width import folded
+from catenary.postproc.evaluate.wording import folded
 from catenary.postproc.report import study_table
 from catenary.postproc.report.study_table import Column, StudyTable
 

@@ -7,7 +7,7 @@ import pytest
 from small_lines import WHOLE, ac_simple_line, mesh_of, problem_of
 
 from catenary.solver.model import matrices
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 @pytest.mark.parametrize("rows", [(0, None), (36, 400), (36, 36)])

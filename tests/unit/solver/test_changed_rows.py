@@ -7,7 +7,7 @@ import pytest
 from scipy import sparse
 
 from catenary.solver.kernels import native
-from catenary.solver.tangents.changed_rows import changed_rows
+from catenary.solver.tangents.lanes import changed_rows
 from catenary.solver.tangents.set_up import Change, MatrixTerm
 
 # Those of a motion of which z is no acceleration alone.

@@ -15,28 +15,26 @@ from studies import few
 
 from catenary import RunBroken
 from catenary.mbs.air import Polynomial, Tunnel, Uplift
-from catenary.mbs.control import Regulation
-from catenary.mbs.head.laws import Law
+from catenary.mbs.head.laws import Law, Regulation
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.rigid.forces import PointForce
-from catenary.mbs.vehicle.base_motion import Harmonic, VehicleMotion
-from catenary.mbs.vehicle.irregularity import Irregularity
+from catenary.mbs.vehicle import Harmonic, Irregularity, VehicleMotion
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
-from catenary.solver.contact_problem import complementarity
+from catenary.solver.contact_problem import coupling
 from catenary.solver.effects.effect import Effect
 from catenary.solver.integrators import line_loads
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics, table
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
-from catenary.solver.schemes.one_solve import OneSolve
+from catenary.solver.schemes.scheme import OneSolve
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.march import Outcome
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
-from catenary.solver.wind.drag import along
+from catenary.solver.wind import along
 
 LINE = replace(ac_simple_line(4), stagger=(0.2, -0.2, 0.2, -0.2, 0.2))
 TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
@@ -242,13 +240,13 @@ def test_steps_that_a_loop_repeats_or_leaves_to_the_scheme_are_those_from_python
     )))  # fmt: skip
     usual = from_python(scene, mesh)[0].rows
     if fault == "cycles":
-        monkeypatch.setattr(complementarity, "_MAX_ROUNDS", 0)
+        monkeypatch.setattr(coupling, "_MAX_ROUNDS", 0)
     elif fault == "room":
         monkeypatch.setattr("catenary.solver.contact_problem.force_exchange._FIRST_CAPACITY", 2)
-        monkeypatch.setattr(complementarity, "_FIRST_ROOM", 1)
+        monkeypatch.setattr(coupling, "_FIRST_ROOM", 1)
     else:
-        monkeypatch.setattr("catenary.solver.schemes.one_solve._FIRST_BOUND", 1.0)
-        monkeypatch.setattr("catenary.solver.schemes.one_solve._FIRST_MARGIN", 1e-3)
+        monkeypatch.setattr("catenary.solver.schemes.scheme._FIRST_BOUND", 1.0)
+        monkeypatch.setattr("catenary.solver.schemes.scheme._FIRST_MARGIN", 1e-3)
     finish, finished = OneSolve.finish, []
 
     def counted(self: OneSolve, time: float, stop: bool) -> bool:

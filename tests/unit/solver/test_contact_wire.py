@@ -13,7 +13,7 @@ from small_lines import HANGING, WHOLE, ac_simple_line, mesh_of, numerics, probl
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.kernels import native
 from catenary.solver.model.partition import distribute
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 LINE = ac_simple_line(4)
 EPS = np.finfo(float).eps

@@ -23,17 +23,15 @@ from counted_effects import (
 from small_lines import BARE, EN_PANTOGRAPH, mesh_of, train
 
 from catenary.mbs.build import Operation, make_pantograph
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Turning
-from catenary.mbs.head.wire_crossing import LateralPath
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Limit
 from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.problem.incidents import TensionLoss
-from catenary.solver.problem.irregularities import Irregularities
+from catenary.solver.problem.defects import Irregularities, TensionLoss
 from catenary.solver.problem.problem import Damping
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.solver.model import beam, exact_beam
+from catenary.solver.model import beam
 from catenary.solver.model.beam import shape_slopes, shape_values
 
 EPS = np.finfo(float).eps
@@ -109,8 +109,8 @@ def pinned_wire(
     downward at the node in the middle [N].
     """
     n, tension = elements.size, np.full(elements.size, TENSION)
-    matrices = exact_beam.stiffness(elements, bending_stiffness, tension)
-    share = exact_beam.moment_share(elements, bending_stiffness, tension)
+    matrices = beam.exact_stiffness(elements, bending_stiffness, tension)
+    share = beam.moment_share(elements, bending_stiffness, tension)
     loads = -load * beam.uniform_load(elements)
     loads[:, 1::2] *= share[:, None]
     whole, right = np.zeros((2 * n + 2, 2 * n + 2)), np.zeros(2 * n + 2)
@@ -161,7 +161,7 @@ def test_short_exact_elements_are_those_of_hermite(ratio: float, length: float) 
     k coth k is -k^4 / 45, of k^2 / (k coth k - 1) it is -k^4 / 175, with k = h / 2 r."""
     one, tension = np.array([length]), np.array([TENSION])
     bending = TENSION * (length / ratio) ** 2
-    exact = exact_beam.stiffness(one, bending, tension)[0]
+    exact = beam.exact_stiffness(one, bending, tension)[0]
     hermite = beam.stiffness(one, bending, TENSION)[0]
     # In terms of EI / h, for deflections in terms of h.
     scale = np.array([length, 1.0, length, 1.0])

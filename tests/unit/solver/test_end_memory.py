@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from catenary import InputError
-from catenary.solver.integrators.end_memory import NEAR
-from catenary.solver.integrators.line_loads import LineLoads
+from catenary.solver.integrators.line_loads import NEAR, LineLoads
 from catenary.solver.integrators.line_state import LineState
-from catenary.solver.linear.halo import Subdomain
+from catenary.solver.linear.line_products import Subdomain
 from catenary.solver.model.loads import MemoryLoad, ShapeLoad
 
 DT = 1e-3

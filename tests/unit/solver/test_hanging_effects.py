@@ -19,7 +19,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.effects.build_model import build
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 @pytest.fixture(scope="module")

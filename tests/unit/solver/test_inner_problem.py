@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.solver.contact.followed_links import no_links
-from catenary.solver.contact.head_states import Heads
-from catenary.solver.contact.line_response import LineResponse
-from catenary.solver.contact_problem import complementarity
-from catenary.solver.contact_problem.complementarity import InnerProblem, InnerSolution
+from catenary.solver.contact.forces_on_line import no_links
+from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact_problem import coupling
+from catenary.solver.contact_problem.coupling import InnerProblem, InnerSolution
 from catenary.solver.contact_problem.law_tangents import HertzInSteps, LawInSteps
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
@@ -151,7 +150,7 @@ def test_pivoting_finds_the_same_solution(case: Case) -> None:
     """Without any round of the active set, the fallback has to do all the work."""
     usual = case.solve()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(complementarity, "_MAX_ROUNDS", 0)
+        patch.setattr(coupling, "_MAX_ROUNDS", 0)
         pivoted = case.solve()
     assert pivoted.pivoted and not usual.pivoted
     assert case.violation(pivoted) < TOLERANCE

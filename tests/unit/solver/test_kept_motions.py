@@ -11,8 +11,8 @@ from measuring import start_march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import MESSENGER_WIRE
-from catenary.solver.contact_problem import complementarity
-from catenary.solver.problem.incidents import TensionLoss
+from catenary.solver.contact_problem import coupling
+from catenary.solver.problem.defects import TensionLoss
 from catenary.solver.problem.problem import BOUNDED, EXACT, Problem, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
@@ -92,7 +92,7 @@ def test_kept_motions_are_those_of_single_steps(
         loss = TensionLoss(0.16, MESSENGER_WIRE, 0.9)
         scene = problem(frozenset({"tension_loss"}), incidents=(loss,))
     if way == "left to the scheme":
-        monkeypatch.setattr(complementarity, "_MAX_ROUNDS", 0)
+        monkeypatch.setattr(coupling, "_MAX_ROUNDS", 0)
     elif way == "no room":
         monkeypatch.setattr(compiled_steps, "_MOTION_BYTES", 0)
     elif way == "one at a time":
@@ -130,7 +130,7 @@ def test_motions_of_a_window_are_those_of_the_whole_line(
         patch.setattr(step_views.ShownMotion, "take_changes", whole_line)
         expected = watched(scene, elements=2)
     if way == "left to the scheme":
-        monkeypatch.setattr(complementarity, "_MAX_ROUNDS", 0)
+        monkeypatch.setattr(coupling, "_MAX_ROUNDS", 0)
     elif way == "no room":
         monkeypatch.setattr(compiled_steps, "_MOTION_BYTES", 30_000)
     elif way == "one at a time":

@@ -17,7 +17,7 @@ from small_lines import BARE, mesh_of
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 @pytest.fixture(scope="module")

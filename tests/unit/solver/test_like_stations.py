@@ -9,19 +9,14 @@ import pytest
 from measuring import COMM, matrix_of
 from small_lines import HANGING, ac_simple_line, mesh_of, problem_of
 
-from catenary.solver.linear.decay_length import reach
-from catenary.solver.linear.stations.like_stations import LikeStations
-from catenary.solver.linear.unit_responses import (
-    ShortColumns,
-    UnitResponses,
-    Windows,
-)
-from catenary.solver.model import operator_bands
+from catenary.solver.linear.station_rows import LikeStations
+from catenary.solver.linear.unit_responses import ShortColumns, UnitResponses, Windows, reach
+from catenary.solver.model import matrices
+from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
-from catenary.solver.model.operator_bands import OperatorBands
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 DAMPED = HANGING | {"structural_damping"}
 # M, K and C in A for steps of 0.2 ms: columns reach less than a span.
@@ -135,7 +130,7 @@ def test_bands_of_a_stretch_are_those_of_its_own_matrix(
     long_line: Model, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whether put together alone or with others: terms are added in one order."""
-    monkeypatch.setattr(operator_bands, "_AT_ONCE", at_once)
+    monkeypatch.setattr(matrices, "_AT_ONCE", at_once)
     starts, n = long_line.numbering.starts, long_line.n_dofs
     whole = matrix_of(long_line, *COEFFICIENTS).toarray()
     whole[np.diag_indices(n)] += np.isin(np.arange(n), long_line.constrained)

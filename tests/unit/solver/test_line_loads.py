@@ -11,7 +11,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.build_model import build
 from catenary.solver.integrators import line_loads
 from catenary.solver.integrators.line_loads import LineLoads
-from catenary.solver.linear.halo import Subdomain
+from catenary.solver.linear.line_products import Subdomain
 from catenary.solver.model.loads import (
     FieldLoad,
     FunctionLoad,
@@ -20,7 +20,7 @@ from catenary.solver.model.loads import (
     harmonics,
     table,
 )
-from catenary.solver.wind.drag import along
+from catenary.solver.wind import along
 
 NOBODY = np.zeros(0, dtype=np.int64)
 WHOLE = Subdomain(0, 12, 0, 12, 0, 12)

@@ -16,7 +16,7 @@ from catenary.solver.model.loads import Load, ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Numerics
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 STEPS = 40
 # Round-off of a step, which 40 steps add up; forces of accelerations differ most.

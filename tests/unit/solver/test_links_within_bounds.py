@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.solver.schemes.one_solve import OneSolve
+from catenary.solver.schemes.scheme import OneSolve
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
 

@@ -25,13 +25,12 @@ from small_lines import (
 from catenary import RunBroken
 from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear.decay_length import DECAY, reach
-from catenary.solver.linear.unit_responses import UnitResponses, Windows
+from catenary.solver.linear.unit_responses import DECAY, UnitResponses, Windows, reach
+from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
-from catenary.solver.model.operator_bands import OperatorBands
-from catenary.solver.model.unknown_registry import Unknowns
+from catenary.solver.model.unknowns import Unknowns
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 DAMPED = HANGING | {"structural_damping"}
 

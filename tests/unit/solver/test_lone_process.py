@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from program import RANKS_ENVIRONMENT
 
-from catenary.base.lone_process import SETTINGS, settings
+from catenary.base.process import SETTINGS, settings
 
 
 @pytest.fixture(autouse=True)
@@ -43,7 +43,7 @@ def test_ranks_of_a_launcher_reach_each_other(monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("start", ["from catenary.base.lone_process import world; world()",
+@pytest.mark.parametrize("start", ["from catenary.base.process import world; world()",
                                    "import catenary; from mpi4py import MPI"])  # fmt: skip
 def test_programs_that_a_process_with_mpi_starts_have_no_rank(start: str) -> None:
     """As a cell of a notebook that begins with `!`. Open MPI hands the rank down."""
@@ -62,7 +62,7 @@ def test_a_process_with_mpi_may_start_mpirun() -> None:
     """It ended without a word."""
     rank = "from mpi4py import MPI; print(MPI.COMM_WORLD.size)"
     program = (
-        "import subprocess, sys; from catenary.base.lone_process import world; world(); "
+        "import subprocess, sys; from catenary.base.process import world; world(); "
         "subprocess.run(['mpirun', '-n', '2', '--oversubscribe', sys.executable, '-c', "
         f"{rank!r}], check=True)"
     )
@@ -79,9 +79,7 @@ def test_a_process_with_mpi_may_start_mpirun() -> None:
 @pytest.mark.process
 def test_processes_share_no_folder_that_one_could_take_from_another(tmp_path: Path) -> None:
     """Of 240 that started side by side two found the folder removed, and ended."""
-    program = (
-        "from catenary.base.lone_process import world; world(); import os; print(os.listdir({!r}))"
-    )
+    program = "from catenary.base.process import world; world(); import os; print(os.listdir({!r}))"
     done = subprocess.run(
         [sys.executable, "-c", program.format(str(tmp_path))],
         env={**os.environ, "TMPDIR": str(tmp_path)},
@@ -98,9 +96,9 @@ def test_the_program_hands_nothing_of_it_to_jobs_that_it_submits() -> None:
     """SLURM gives a job the environment of ``sbatch``: its ranks need the networks."""
     program = (
         "import os\n"
-        "from catenary.base.lone_process import SETTINGS, world\n"
-        "from catenary.cases.process.library_settings import choose\n"
-        "choose(); world()\n"
+        "from catenary.base.process import SETTINGS, world\n"
+        "from catenary.cases.process.libraries import choose_settings\n"
+        "choose_settings(); world()\n"
         "print(set(SETTINGS) & set(os.environ))"
     )
     done = subprocess.run(

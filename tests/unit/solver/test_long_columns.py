@@ -12,7 +12,7 @@ from catenary.solver.integrators.make_line import make_line
 from catenary.solver.linear import unit_responses
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ from catenary import InputError
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
+from catenary.solver.problem.defects import DropperBreak
 from catenary.solver.problem.ends import Fixed, Periodic
-from catenary.solver.problem.incidents import DropperBreak
 from catenary.solver.problem.problem import BOUNDED, EXACT, Damping, Problem, WindowChoice
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop

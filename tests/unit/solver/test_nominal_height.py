@@ -20,7 +20,7 @@ from catenary.solver.contact.pantographs import nominal_height_rule
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Placement
 from catenary.solver.statics.elasticity import elasticity, middle_span
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 def height_on(line: LineData, elements: int, placement: Placement) -> float:

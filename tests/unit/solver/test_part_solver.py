@@ -13,7 +13,7 @@ from scipy import sparse
 
 from catenary.solver.linear.petsc_solvers import PartSolver, Wrapped, allows_own_factors
 from catenary.solver.linear.station_factors import station_factors
-from catenary.solver.linear.stations.station_layout import Layout
+from catenary.solver.linear.station_products import Layout
 
 N_STATIONS = 12
 
@@ -60,9 +60,9 @@ def test_a_solver_that_nobody_destroyed_does_not_crash_the_end_of_python() -> No
     """PETSc is finalised after Python, and cannot free what is written in Python then."""
     code = (
         "import numpy as np; from scipy import sparse; "
-        "from catenary.solver.linear.stations.sections import Sections; "
-        "from catenary.solver.linear.stations.station_layout import Layout; "
-        "from catenary.solver.linear.stations.station_rows import StationRows; "
+        "from catenary.solver.linear.station_rows import Sections; "
+        "from catenary.solver.linear.station_products import Layout; "
+        "from catenary.solver.linear.station_rows import StationRows; "
         "from catenary.solver.linear.petsc_solvers import PartSolver; "
         "from catenary.solver.linear.station_factors import station_factors; "
         "whole = sparse.identity(8).tobsr((4, 4)); "

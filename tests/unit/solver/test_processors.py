@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from repeating_line import layout, line, station_factors, station_product
 
+from catenary.solver.integrators.line_integrator import StationPasses
 from catenary.solver.integrators.line_state import Newmark, PredictedLineState
-from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
 from catenary.solver.linear.step_operators import ByStations
 

@@ -10,11 +10,7 @@ from repeating_line import layout, line, neighbours, station_factors, station_pr
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from catenary.solver.linear.stations.station_layout import MOST_UNKNOWNS, Layout
-from catenary.solver.linear.stations.station_products import (
-    layout_of,
-    of_pairs,
-)
+from catenary.solver.linear.station_products import MOST_UNKNOWNS, Layout, layout_of, of_pairs
 
 RNG = np.random.default_rng(7)
 # Sums of a dozen products of numbers of order one; solves lose a few digits to the condition, 1e2.

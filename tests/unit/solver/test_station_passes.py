@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from repeating_line import layout, line, station_factors, station_product, widths_of
 
+from catenary.solver.integrators.line_integrator import StationPasses
 from catenary.solver.integrators.line_state import LineState, Newmark, PredictedLineState
-from catenary.solver.integrators.two_pass_step import StationPasses
 from catenary.solver.kernels import native
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import RESERVE

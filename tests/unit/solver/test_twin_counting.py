@@ -18,7 +18,7 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build, numbering_of, with_wires_apart
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknown_registry import Unknowns, number_unknowns
+from catenary.solver.model.unknowns import Unknowns, number_unknowns
 from catenary.solver.problem.problem import Problem
 
 VERTICAL = "w", "theta_y"

@@ -9,12 +9,7 @@ import pytest
 from small_lines import ac_simple_line, mesh_of
 
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
-from catenary.solver.model.unknown_registry import (
-    MOST_STATION_TYPES,
-    Group,
-    Unknowns,
-    number_unknowns,
-)
+from catenary.solver.model.unknowns import MOST_STATION_TYPES, Group, Unknowns, number_unknowns
 
 VERTICAL, LATERAL = (
     {CONTACT_WIRE: names, MESSENGER_WIRE: names} for names in (("w", "theta_y"), ("v", "theta_z"))

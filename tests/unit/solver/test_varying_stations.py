@@ -17,11 +17,7 @@ from repeating_line import (
 )
 
 from catenary.solver.linear.station_factors import StationFactors
-from catenary.solver.linear.stations.station_products import (
-    StationProduct,
-    layout_of,
-    with_damping,
-)
+from catenary.solver.linear.station_products import StationProduct, layout_of, with_damping
 
 RNG = np.random.default_rng(3)
 ROUND_OFF = 1e-12

@@ -17,7 +17,7 @@ from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import BOUNDED, EXACT, Damping, Numerics, WindowChoice
-from catenary.solver.statics.form_finding.equilibrium import find_form
+from catenary.solver.statics.form_finding import find_form
 
 STEPS = 40
 # As in test_lines_in_two_passes; x / s of a right-hand side by M is known to a rounding of itself,

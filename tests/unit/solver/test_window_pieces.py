@@ -12,8 +12,7 @@ from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
 from stitched_line import stitched_line
 
 from catenary import RunBroken
-from catenary.solver.linear import unit_responses
-from catenary.solver.linear.pieces import operator_pieces, pieces
+from catenary.solver.linear import pieces, unit_responses
 from catenary.solver.problem.problem import BOUNDED, Damping, Problem, WindowChoice
 from catenary.solver.window import moving_window
 
@@ -136,7 +135,7 @@ def test_columns_that_reach_further_than_those_tried_are_borne_or_told(
 def test_factors_of_pieces_must_be_finite() -> None:
     _, operators, _ = histories(*scene(1.0))
     factors, made = operators.factors, operators.pieces.first()
-    _, (rows,) = operator_pieces.rows_on(operators._model, made, operators._coefficients)
+    _, (rows,) = pieces.rows_on(operators._model, made, operators._coefficients)
     broken = rows._replace(blocks=np.full_like(rows.blocks, np.nan))
     with pytest.raises(RunBroken, match="singular or not finite"):
         factors.make(made, broken)

@@ -1,0 +1,287 @@
+"""The verbs ``plan``, ``check``, ``mesh``, ``static`` and ``prepare``: a scene before any run.
+
+``plan`` says what a scene simulates, what that costs, and what each effect is worth; the others
+check, draw, print or write the scene's line.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import catenary
+from catenary.base.errors import InputError
+from catenary.cases.cli.app import (
+    Force,
+    Jobs,
+    SceneWords,
+    folder_option,
+    print_findings,
+    serial_verb,
+)
+from catenary.cases.result_folder.output_folder import new_file
+from catenary.cases.terminal import console
+from catenary.postproc.evaluate.wording import counted
+
+if TYPE_CHECKING:
+    from catenary.cases.studies.effect_cost import CostOptions
+
+_RUNS = "runs"
+_MOST_ROUNDS = 1000
+
+
+@serial_verb(
+    "plan",
+    help="Print what a case simulates and what a run of it needs. With --cost, switch each effect "
+    "in turn, and print the time of a step and the change of results.",
+    epilog="Example: catenary plan ac_simple --set train.speed_km_h=320; "
+    "catenary plan ambrosio2012 --cost --stretch-m 100 -o results/cost",
+)
+def plan(
+    words: SceneWords,
+    cost: Annotated[
+        bool,
+        typer.Option(
+            "--cost", help="Measure what each effect costs and changes, on one rank; a minute."
+        ),
+    ] = False,
+    only: Annotated[
+        str | None,
+        typer.Option("--only", metavar="EFFECT,...", help="With --cost: these effects alone."),
+    ] = None,
+    stretch: Annotated[
+        float | None,
+        typer.Option("--stretch-m", help="With --cost: length to evaluate at most; 200 if absent."),
+    ] = None,
+    rounds: Annotated[
+        int | None,
+        typer.Option("--rounds", help="With --cost: how often steps are timed; 10 if absent."),
+    ] = None,
+    tolerance: Annotated[
+        str | None,
+        typer.Option(
+            "--tolerance",
+            metavar="PERCENT",
+            help="With --cost: smaller changes of results do not count; 1% if absent.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        folder_option("With --cost: folder for tables and runs; the same command reuses these."),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --cost: print JSON in place of the table.")
+    ] = False,
+    n_jobs: Jobs = 1,
+    force: Force = False,
+) -> int:
+    """Serial."""
+    if cost:
+        from catenary.cases.studies.accuracy.analysis import parse_target
+        from catenary.cases.studies.effect_cost import CostOptions
+
+        wanted = 0.01 if tolerance is None else parse_target(tolerance, "--tolerance") / 100
+        options = CostOptions(
+            words.case,
+            words.changes,
+            words.shortened,
+            200.0 if stretch is None else _within("--stretch-m", stretch, 1.0, 1e7),
+            10 if rounds is None else int(_within("--rounds", rounds, 1, _MOST_ROUNDS)),
+            wanted,
+            [] if only is None else [name.strip() for name in only.split(",")],
+        )
+        return _cost(options, out, as_json, n_jobs, force)
+    belonging = {
+        "--only": only, "--stretch-m": stretch, "--rounds": rounds, "--tolerance": tolerance,
+        "-o": out, "--json": as_json or None, "--force": force or None,
+        "-j": None if n_jobs == 1 else n_jobs,
+    }  # fmt: skip
+    for option, value in belonging.items():
+        if value is not None:
+            raise InputError(f"{option} belongs to plan --cost; give both")
+    console.say(str(catenary.plan(words.scene())))
+    return console.DONE
+
+
+def _within(option: str, value: float, low: float, high: float) -> float:
+    if not low <= value <= high:
+        raise InputError(f"{option} {value:g} must be between {low:g} and {high:g}")
+    return value
+
+
+def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
+    """Runs ``--cost``; returns the exit code."""
+    from catenary.base.parallel import launched_by_mpirun
+    from catenary.callers import temporary_folder
+    from catenary.cases.process.petsc_options import as_arguments, start_petsc
+    from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
+    from catenary.cases.scene.load import load_scene
+    from catenary.cases.studies.records import held_study
+
+    if launched_by_mpirun() and console.world().size > 1:
+        raise InputError(
+            f"plan --cost times steps on one rank, not on {console.world().size}: start it without "
+            "mpirun"
+        )
+    if out is not None:
+        refuse_impossible(out)
+    scene = load_scene(options.case, options.overrides, options.shortened)
+    comm = console.alone()
+    start_petsc(as_arguments(scene.petsc.given(), []))
+    from catenary.cases.studies import effect_cost
+
+    def say(line: str) -> None:
+        if not as_json:
+            console.say(line)
+
+    with ExitStack() as stack:
+        held = stack.enter_context(held_study(out, comm, f"catenary plan {options.case} --cost"))
+        if out is not None:
+            refuse_table(out / effect_cost.RECORD, force)
+        folder = out or stack.enter_context(temporary_folder(comm, "cost"))
+        found = effect_cost.measure(options, folder / _RUNS, say, force, n_jobs)
+        files = [] if found is None else held.write(lambda: effect_cost.files_of(found))
+    if found is None:
+        again = "" if out is None else "; the same command continues it"
+        console.complain(f"interrupted before all effects were run{again}")
+        return console.BROKEN
+    if as_json:
+        from catenary.postproc.report.study_table import json_text
+
+        console.say(json_text(effect_cost.record_of(found)).rstrip(), whole=True)
+    else:
+        print_findings(effect_cost.as_text(found), files)
+    return console.DONE
+
+
+@serial_verb(
+    "check",
+    help="Check a case without running it. It looks at keys, bounds, geometry, effects, mesh, "
+    "pantographs, and whether a dropper is slack at rest; it writes nothing.",
+    epilog="Example: catenary check my_line/case.toml --set line.dropper.pre_sag_mid_mm=60",
+)
+def check(
+    words: SceneWords,
+) -> int:
+    """Serial."""
+    from catenary.cases.scene.input.faults import SceneError
+
+    try:
+        scene = words.scene()
+    except SceneError as error:
+        for line in error.lines():
+            console.complain(line)
+        return console.BAD_INPUT
+    warnings = catenary.check(scene)
+    console.say("\n".join(warnings.sentences))
+    for text in warnings:
+        console.warn(text)
+    return console.DONE
+
+
+@serial_verb(
+    "mesh",
+    help="Write the mesh of a case, or draw its line to scale. The mesh is a Gmsh file; the "
+    "drawing shows the line at rest.",
+    epilog="Example: catenary mesh re330_stitched -o re330.svg",
+)
+def mesh(
+    words: SceneWords,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--out",
+            help="File to write: *.msh is the mesh; *.png and *.svg draw side view, plan view and "
+            "a cross-section.",
+        ),
+    ],
+    force: Force = False,
+) -> None:
+    """Serial."""
+    scene = words.load()
+    from catenary.cases.run.scene_mesh import DRAWN, draw_scene, write_mesh_of
+
+    if out.suffix in DRAWN:
+        first, last = draw_scene(scene, out, force)
+        console.say(f"{out}: the line at rest from {first:g} to {last:g} m")
+        return
+    made = write_mesh_of(scene, out, force)
+    console.say(f"{out}: {made.n_nodes} nodes, {counted(made.droppers.shape[0], 'dropper')}")
+
+
+@serial_verb(
+    "static",
+    help="Print droppers, registration, sag, elasticity at rest.",
+    epilog="Example: catenary static ac_simple -o droppers.csv",
+)
+def static(
+    words: SceneWords,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="Also write a file: *.csv holds the dropper table, *.json everything; with "
+            "--temperatures *.png and *.svg draw them.",
+        ),
+    ] = None,
+    force: Force = False,
+    registration: Annotated[
+        bool,
+        typer.Option("--registration", help="Write the table of the steady arms as *.csv."),
+    ] = False,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--temperatures",
+            metavar="LOW,HIGH",
+            help="Instead print tensions along the section and how far the ends of wires move, "
+            "from LOW to HIGH K above the installation.",
+        ),
+    ] = None,
+) -> None:
+    """Serial."""
+    if registration and (out is None or over is not None):
+        raise InputError("--registration takes -o with the name of a *.csv file to write")
+    if out is not None:
+        tables = (".csv",) if registration else (".csv", ".json")
+        new_file(out, tables if over is None else (".png", ".svg"), force)
+    if over is not None:
+        from catenary.cases.run.at_rest import range_of, temperatures
+
+        differences = range_of(over)
+        console.say(temperatures(words.load(), differences, out))
+        return
+    rest = catenary.static(words.scene())
+    if out is not None:
+        from catenary.line_tables import write_rest
+
+        write_rest(rest, out, registration)
+    console.say(str(rest))
+
+
+@serial_verb(
+    "prepare",
+    help="Write a line and its pantographs for steps from outside. A C program, a real-time "
+    "computer or a controller in Python takes these steps.",
+    epilog="Example: catenary prepare en50318_2002 -o en300.line --set train.speed_km_h=300",
+)
+def prepare(
+    words: SceneWords,
+    out: Annotated[Path, typer.Option("-o", "--out", help="File to write: *.line.")],
+    force: Force = False,
+) -> None:
+    """Serial."""
+    path = catenary.prepare(words.scene(), out, force=force)
+    from catenary.cases.run.prepared import HEADER, LIBRARY
+
+    with catenary.Simulation(path) as line:
+        steps = f"{line.steps_left} steps of {line.dt * 1e3:g} ms"
+    console.say(
+        f"{out}: {steps}, {out.stat().st_size / 1e6:.0f} MB\n"
+        f"C programs include {HEADER} and link {LIBRARY}; Python has catenary.Simulation"
+    )

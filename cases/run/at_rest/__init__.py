@@ -1,1 +1,0 @@
-"""Tables of a scene's line at rest, without a march: heights, droppers, temperatures."""

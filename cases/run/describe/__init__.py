@@ -1,1 +1,0 @@
-"""Sentences on a run: its pantographs, incidents, ends of the line, waves that come back."""

@@ -1,1 +1,0 @@
-"""Planning a run: what it simulates, its size, and what it needs of time, memory and disk."""

@@ -1,0 +1,546 @@
+"""Sensitivities of a case: its statistics by one march, its line at rest; as tables and text.
+
+Statistics, and the shape and elasticity of a span at rest, are differentiated by parameters of the
+scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from catenary.base.errors import InputError
+from catenary.cases.run.prepared import sound_rest
+from catenary.cases.scene.scene import Scene, problem_of
+from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
+from catenary.cases.terminal.runs_bar import RunsBar
+from catenary.cases.terminal.terminal_text import elasticity_text
+from catenary.meshgen.wires import Role
+from catenary.postproc.channels.header import places_on_train
+from catenary.postproc.evaluate import filters, statistics
+from catenary.postproc.evaluate.statistics import ForceDerivatives, covers
+from catenary.postproc.report.study_table import Column, StudyTable
+from catenary.solver.model.model import same_matrices
+from catenary.solver.statics.line_at_rest import LineAtRest
+from catenary.solver.tangents.march import Tangents, march_with_tangents
+from catenary.solver.tangents.set_up import (
+    Change,
+    SetUp,
+    derivative,
+    differentiate,
+    set_up_of,
+)
+
+# Memory for derivatives of all steps; for further parameters the march is made again [B].
+_BYTES = 2**28
+
+
+@dataclass
+class Sensitivity:
+    """A case differentiated by parameters.
+
+    Attributes
+    ----------
+    names : of the pantographs
+    statistics : "mean", "std", "max" and "min" of the force of each of them below 20 Hz in the
+        evaluated stretch [N]
+    max_uplift : largest uplift of evaluated arms [m], NaN if there are none
+    parameters : by which it was differentiated
+    by_force : of each parameter, for each pantograph, derivatives of its statistics per unit of the
+        parameter's key
+    by_uplift : of each parameter that of the largest uplift [m]
+    n_steps : of the march
+    step_m : what it runs in a step
+    contact_switches, link_switches : see ``Tangents``
+    left_out : keys of usual parameters by which it cannot be differentiated, and why
+    """
+
+    names: list[str]
+    statistics: list[dict[str, float]]
+    max_uplift: float
+    n_steps: int
+    step_m: float
+    contact_switches: int
+    link_switches: int
+    parameters: list[Parameter] = field(default_factory=list)
+    by_force: list[list[ForceDerivatives]] = field(default_factory=list)
+    by_uplift: list[float] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+
+
+def sensitivity_of(
+    scene: Scene,
+    keys: Sequence[str],
+    comm: Any,
+    *,
+    droppers: bool = False,
+    shows: bool = False,
+) -> Sensitivity:
+    """Differentiate the statistics of a scene. Not collective: one process.
+
+    Parameters
+    ----------
+    scene : checked
+    keys : of the parameters; the usual ones if there are none and ``droppers`` is not set
+    droppers : whether the length of each dropper in the evaluated stretch is a parameter
+    comm : mpi4py communicator of this process alone
+    shows : whether a bar counts set-ups and tangents, if somebody looks on
+
+    Raises
+    ------
+    InputError
+        If the march has parts without derivatives, or by a parameter that was named.
+    RunBroken
+        If the march breaks.
+    """
+    filters.check_sampling(scene.numerics.dt_s)
+    scenes = ChangedScenes(scene)
+    parameters = parameters_of(scenes, keys, droppers)
+    at_rest = sound_rest(scenes.scene)
+    now = set_up_of(comm, at_rest)
+    changes: list[Change] = []
+    kept, left_out = [], {}
+    found: Sensitivity | None = None
+    steps = 2 * len(parameters) if shows else 0
+    with RunsBar(steps, lambda line: None, what="set-ups and tangents") as bar:
+        for parameter in parameters:
+            try:
+                changes.append(change_by(parameter, scenes, at_rest, now, comm))
+            except InputError as error:
+                if keys or droppers:
+                    raise
+                left_out[parameter.key] = str(error)
+            else:
+                kept.append(parameter)
+            bar.ended()
+        for part in parts_of(changes, at_rest, now):
+            marched = march_with_tangents(comm, at_rest, changes[part])
+            if found is None:
+                found = _without_parameters(marched, at_rest)
+            _add(found, marched, at_rest, kept[part])
+            bar.ended(len(kept[part]))
+    assert found is not None
+    found.left_out = left_out
+    return found
+
+
+def change_by(
+    parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest, now: SetUp, comm: Any
+) -> Change:
+    """The derivative of a march's set-up by a parameter. Not collective.
+
+    Parameters
+    ----------
+    scenes : the scene, unchanged
+    at_rest, now : its line and set-up
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+
+    def set_up(by: float) -> SetUp:
+        try:
+            if parameter.is_of_train:
+                rest = at_rest.under(problem_of(scenes.changed(parameter, by)))
+            else:
+                rest = scenes.rest(parameter, by)
+        except InputError as error:
+            raise InputError(
+                f"{parameter.key} is at a bound of what is allowed, where a march has no "
+                f"derivative to both sides: {error}"
+            ) from error
+        # Of a shape that changes no matrix, these are taken over.
+        same = parameter.is_of_shape and same_matrices(rest.model, at_rest.model)
+        same = same or parameter.is_of_train
+        return set_up_of(comm, rest, len(now.drives), now if same else None)
+
+    return differentiate(set_up, now, parameter.step, parameter.key)
+
+
+def parts_of(changes: Sequence[Change], at_rest: LineAtRest, now: SetUp) -> Iterator[slice]:
+    """Changes by parts for each of which a march is made: all at once need too much memory. One
+    part, empty, without changes."""
+    n_results = 2 * len(now.heads) + at_rest.mesh.steady_arms.size
+    most = max(1, _BYTES // (8 * len(now.drives) * n_results))
+    for first in range(0, max(1, len(changes)), most):
+        yield slice(first, first + most)
+
+
+def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
+    statistics = []
+    for number, within in _within(marched, at_rest):
+        force = filters.low_pass(marched.force[:, number], marched.dt)[within]
+        figures = ("mean", "std", "max", "min")
+        statistics.append({name: float(getattr(force, name)()) for name in figures})
+    n = len(statistics)
+    names = places_on_train(n)
+    order = np.argsort([place.behind for place in at_rest.problem.train.placements], kind="stable")
+    return Sensitivity(
+        [names[int(place)] for place in np.argsort(order)],
+        statistics,
+        float(marched.uplift.max()) if marched.uplift.size else float("nan"),
+        len(marched.force),
+        marched.speed * marched.dt,
+        marched.contact_switches,
+        marched.link_switches,
+    )
+
+
+def _within(marched: Tangents, at_rest: LineAtRest) -> Iterator[tuple[int, np.ndarray]]:
+    """Each pantograph's number, and which steps it is in the evaluated stretch."""
+    first, last = at_rest.problem.evaluation
+    for number in range(marched.force.shape[1]):
+        position = marched.position[:, number]
+        if not covers(position, (first, last)):
+            raise InputError(
+                f"a pantograph runs from {position[0]:.0f} to {position[-1]:.0f} m, and not "
+                f"through the evaluation stretch from {first:.0f} to {last:.0f} m"
+            )
+        yield number, (position >= first) & (position <= last)
+
+
+def _add(
+    found: Sensitivity, marched: Tangents, at_rest: LineAtRest, parameters: list[Parameter]
+) -> None:
+    """Add the derivatives of a march by some parameters."""
+    by_place = marched.by_position / marched.speed
+    of_all = [
+        statistics.force_derivatives(
+            marched.force[:, number],
+            marched.by_force[:, :, number],
+            within,
+            marched.dt,
+            by_place[:, :, number],
+        )
+        for number, within in _within(marched, at_rest)
+    ]
+    by_uplift = statistics.largest_derivatives(marched.uplift, marched.by_uplift)
+    for place, parameter in enumerate(parameters):
+        found.parameters.append(parameter)
+        found.by_force.append(
+            [ForceDerivatives(*(values[place] for values in own)) for own in of_all]
+        )
+        found.by_uplift.append(float(by_uplift[place]))
+
+
+_MM = 1e3
+# Half of the last digit of the last column, which has one more than others.
+_SEEN = 0.5e-4
+_BY_PERCENT = "std_change_by_percent_N"
+_FORCES = {
+    "mean_change_N": ("mean", "mean [N]"),
+    "std_change_N": ("std", "sigma [N]"),
+    "stat_max_change_N": ("stat_max", ""),
+    "stat_min_change_N": ("stat_min", "stat. min [N]"),
+    "max_change_N": ("maximum", ""),
+    "min_change_N": ("minimum", "least [N]"),
+}
+
+
+def table_of(found: Sensitivity) -> StudyTable:
+    """A row for each parameter and pantograph; first what changes the standard deviation most.
+
+    Figures are changes of the statistics under ``change`` of the parameter, in the unit of its key;
+    the last one is that of the standard deviation under a hundredth of the parameter. Both decide
+    the order: the latter, or the former of a parameter that is zero.
+    """
+    several = len(found.names) > 1
+    columns = [
+        Column("parameter", "parameter"),
+        Column("shown", "value", ">", in_files=False),
+        Column("value"),
+        Column("unit", "unit"),
+        Column("pantograph", "pantograph" if several else ""),
+        Column("change", "change", ".4g"),
+        *(Column(name, head, "+.3f") for name, (_, head) in _FORCES.items()),
+        Column("max_uplift_change_mm", "uplift [mm]", "+.3f"),
+        Column(_BY_PERCENT, "sigma by 1 % [N]", "+.4f"),
+    ]
+
+    def weight(number: int) -> float:
+        ranked = _BY_PERCENT if found.parameters[number].size else "std_change_N"
+        return max(abs(row[ranked]) for row in _rows(found, number))
+
+    order = sorted(range(len(found.parameters)), key=weight, reverse=True)
+    return StudyTable(columns, [row for number in order for row in _rows(found, number)])
+
+
+def _rows(found: Sensitivity, number: int) -> list[dict[str, Any]]:
+    parameter = found.parameters[number]
+    change, uplift = parameter.change, found.by_uplift[number]
+    rows = []
+    for name, own in zip(found.names, found.by_force[number], strict=True):
+        row: dict[str, Any] = {
+            "parameter": parameter.key,
+            "shown": parameter.text,
+            "value": parameter.values[0] if len(parameter.values) == 1 else [*parameter.values],
+            "unit": parameter.unit,
+            "pantograph": name,
+            "change": change,
+        }
+        row |= {column: change * float(getattr(own, of)) for column, (of, _) in _FORCES.items()}
+        row["max_uplift_change_mm"] = None if np.isnan(uplift) else change * uplift * _MM
+        row[_BY_PERCENT] = 0.01 * parameter.size * float(own.std) if parameter.size else None
+        rows.append(row)
+    return rows
+
+
+def as_text(found: Sensitivity) -> str:
+    """Text for the terminal: the statistics, the table, and the limits of the derivatives."""
+    lines = []
+    for name, own in zip(found.names, found.statistics, strict=True):
+        lines.append(
+            f"{name}: mean {own['mean']:.2f} N, sigma {own['std']:.2f} N, "
+            f"statistical minimum {own['mean'] - 3.0 * own['std']:.1f} N, "
+            f"least {own['min']:.1f} N, largest {own['max']:.1f} N"
+        )
+    if not np.isnan(found.max_uplift):
+        lines.append(f"largest uplift {found.max_uplift * _MM:.1f} mm")
+    lines += ["", "Changes of these under a change of each parameter:", table_of(found).text(), ""]
+    lines += _idle(found)
+    lines += [_kinks(found), *_early(found)]
+    for key, why in found.left_out.items():
+        lines.append(f"{key} is left out: {why}")
+    return "\n".join(lines)
+
+
+def _idle(found: Sensitivity) -> list[str]:
+    """A sentence on the parameters whose rows have nothing but zeros."""
+    figures = [*_FORCES, "max_uplift_change_mm", _BY_PERCENT]
+    idle = [
+        parameter.key
+        for number, parameter in enumerate(found.parameters)
+        if all(abs(row[name] or 0.0) < _SEEN for row in _rows(found, number) for name in figures)
+    ]
+    return [f"Without effect in the digits above: {', '.join(idle)}.\n"] if idle else []
+
+
+def _kinks(found: Sensitivity) -> str:
+    contacts, links = found.contact_switches, found.link_switches
+    return (
+        f"In {found.n_steps} steps contacts opened or closed {contacts} times and droppers or "
+        f"other links switched {links} times. Derivatives hold for changes that leave all of these "
+        "in their steps; those of least and largest values also require that these stay at their "
+        "step and arm. Larger changes add the effect of the switches that move."
+    )
+
+
+def _early(found: Sensitivity) -> list[str]:
+    """Sentences on parameters that move the train along the track, and so all switches at once."""
+    sentences = []
+    for one in found.parameters:
+        # By so much the train is a step farther at the end of the march.
+        if one.key == "train.speed_km_h":
+            least = one.size / found.n_steps
+        elif one.key == "train.start_m":
+            least = found.step_m
+        else:
+            continue
+        sentences.append(
+            f"{one.key} already moves some of these by {least:.1g} {one.unit}: for larger "
+            "changes its derivative may be wrong in size and even in sign. Run variants of it "
+            "(`catenary sweep`)."
+        )
+    return sentences
+
+
+_MM_IN_M = 1e3
+# Half of the last digit of a height's change [mm]: a smaller one is round-off, which has no place.
+_SEEN_HEIGHT_MM = 0.5e-3
+
+
+@dataclass(frozen=True)
+class RestSensitivity:
+    """Shape and elasticity of the span in the middle of a line, differentiated by m parameters.
+
+    Attributes
+    ----------
+    wires : names of the w contact wires
+    x : (n,) places of their nodes along the track, ascending [m]
+    height : (n, w) of the wires at rest above the rail, NaN where a wire is not [m]
+    elasticity : (n,) lift of a head that touches all of them by a unit force [m/N]
+    parameters : by which the line was differentiated
+    by_height, by_elasticity : (m, n, w) and (m, n) derivatives per unit of each parameter's key
+    left_out : keys of usual parameters by which it cannot be differentiated, and why
+    """
+
+    wires: list[str]
+    x: np.ndarray
+    height: np.ndarray
+    elasticity: np.ndarray
+    parameters: list[Parameter]
+    by_height: np.ndarray
+    by_elasticity: np.ndarray
+    left_out: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def by_non_uniformity(self) -> np.ndarray:
+        """Derivatives (m,) of the non-uniformity (max - min) / (max + min) of the elasticity."""
+        low, high = self.elasticity.argmin(), self.elasticity.argmax()
+        least, most = self.elasticity[low], self.elasticity[high]
+        by_least, by_most = self.by_elasticity[:, low], self.by_elasticity[:, high]
+        return np.asarray(2.0 * (least * by_most - most * by_least) / (most + least) ** 2)
+
+
+def rest_sensitivity_of(
+    scene: Scene, keys: Sequence[str], *, droppers: bool = False
+) -> RestSensitivity:
+    """Differentiate the line of a scene at rest. Not collective.
+
+    Lines at rest with the parameter a little lower and higher are compared.
+
+    Parameters
+    ----------
+    scene : checked
+    keys : of the parameters; the usual ones of the line if there are none and ``droppers`` is not
+        set
+    droppers : whether the length of each dropper in the evaluated stretch is a parameter
+
+    Raises
+    ------
+    InputError
+        If the line cannot hang, or by a parameter that was named.
+    """
+    scenes = ChangedScenes(scene)
+    named = bool(keys) or droppers
+    at_rest = sound_rest(scene)
+    now = _numbers(at_rest)
+    parameters, found, left_out = [], [], {}
+    for parameter in parameters_of(scenes, keys, droppers):
+        if parameter.is_of_train and not named:
+            continue
+        try:
+            own = _derivative(parameter, scenes, at_rest)
+        except InputError as error:
+            if named:
+                raise
+            left_out[parameter.key] = str(error)
+            continue
+        if named or np.nan_to_num(own).any():  # damping changes nothing at rest
+            parameters.append(parameter)
+            found.append(own)
+    derivatives = np.array(found).reshape(-1, *now.shape)
+    return RestSensitivity(
+        [wire.name for wire in at_rest.problem.line.wires_of(Role.CONTACT)],
+        at_rest.lift.x,
+        now[:, :-1],
+        now[:, -1],
+        parameters,
+        derivatives[..., :-1],
+        derivatives[..., -1],
+        left_out,
+    )
+
+
+def _numbers(at_rest: LineAtRest) -> np.ndarray:
+    """Heights of the contact wires and elasticity at the places of the latter, (n, w + 1)."""
+    mesh, x = at_rest.mesh, at_rest.lift.x
+    columns = [
+        np.interp(x, mesh.x(nodes), at_rest.form.height[nodes], left=np.nan, right=np.nan)
+        for nodes in at_rest.model.nodes_of(Role.CONTACT)
+    ]
+    return np.stack([*columns, at_rest.lift.lift], axis=1)
+
+
+def _derivative(parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest) -> np.ndarray:
+    """Derivatives of ``_numbers`` per unit of a parameter."""
+    if parameter.is_of_train:
+        raise InputError(f"{parameter.key} does not change the line at rest")
+    taut = at_rest.form.dropper_force > 0.0
+
+    def numbers(by: float) -> np.ndarray:
+        rest = scenes.rest(parameter, by)
+        if rest.lift.x.shape != at_rest.lift.x.shape or np.any(rest.lift.x != at_rest.lift.x):
+            raise InputError(
+                f"{parameter.key} moves nodes of the mesh, by which the line at rest has no "
+                "derivative here; take it away"
+            )
+        if np.any((rest.form.dropper_force > 0.0) != taut):
+            raise InputError(
+                f"{parameter.key} makes a dropper slack or taut at rest, where the line has no "
+                "derivative; take it away"
+            )
+        return _numbers(rest)
+
+    step = parameter.step
+    return derivative(numbers(-step), numbers(step), step)
+
+
+def along_span(found: RestSensitivity) -> StudyTable:
+    """A row for each parameter, contact wire and place: changes under ``change`` of the parameter,
+    in the unit of its key."""
+    columns = [Column(name) for name in (
+        "parameter", "unit", "change", "wire", "x_m", "height_m", "height_change_mm",
+        "elasticity_mm_per_N", "elasticity_change_mm_per_N",
+    )]  # fmt: skip
+    rows = [
+        {
+            "parameter": parameter.key,
+            "unit": parameter.unit,
+            "change": parameter.change,
+            "wire": wire,
+            "x_m": float(found.x[i]),
+            "height_m": float(found.height[i, j]),
+            "height_change_mm": _MM_IN_M * parameter.change * float(found.by_height[m, i, j]),
+            "elasticity_mm_per_N": _MM_IN_M * float(found.elasticity[i]),
+            "elasticity_change_mm_per_N": _MM_IN_M
+            * parameter.change
+            * float(found.by_elasticity[m, i]),
+        }
+        for m, parameter in enumerate(found.parameters)
+        for j, wire in enumerate(found.wires)
+        for i in np.flatnonzero(np.isfinite(found.height[:, j])).tolist()
+    ]
+    return StudyTable(columns, rows)
+
+
+def summary(found: RestSensitivity) -> StudyTable:
+    """A row for each parameter: what it changes most in the span; the largest change first."""
+    columns = [
+        Column("parameter", "parameter"),
+        Column("shown", "value", ">"),
+        Column("unit", "unit"),
+        Column("change", "change", ".4g"),
+        Column("height", "height [mm]", "+.3f"),
+        Column("at", "at [m]", ".1f"),
+        Column("mean", "mean elasticity [%]", "+.4f"),
+        Column("non_uniformity", "non-uniformity [%]", "+.4f"),
+    ]
+    rows = []
+    for m, parameter in enumerate(found.parameters):
+        moved = np.nan_to_num(found.by_height[m])
+        place, wire = np.unravel_index(np.abs(moved).argmax(), moved.shape)
+        change = parameter.change
+        height = _MM_IN_M * change * float(moved[place, wire])
+        rows.append(
+            {
+                "parameter": parameter.key,
+                "shown": parameter.text,
+                "unit": parameter.unit,
+                "change": change,
+                "height": height,
+                "at": float(found.x[place]) if abs(height) >= _SEEN_HEIGHT_MM else None,
+                "mean": 100.0
+                * change
+                * float(found.by_elasticity[m].sum() / found.elasticity.sum()),
+                "non_uniformity": 100.0 * change * float(found.by_non_uniformity[m]),
+            }
+        )
+    return StudyTable(columns, sorted(rows, key=lambda row: -abs(row["height"])))
+
+
+def rest_text(found: RestSensitivity) -> str:
+    """Text for the terminal: the span as it is, and what each parameter changes."""
+    lines = [
+        elasticity_text(found.x, found.elasticity),
+        "",
+        "Changes under a change of each parameter; of the height the largest:",
+        summary(found).text(),
+    ]
+    lines += [f"{key} is left out: {why}" for key, why in found.left_out.items()]
+    return "\n".join(lines)

@@ -1,1 +1,0 @@
-"""Linearisation, frequency response, and the lumped model fitted to it."""

@@ -1,1 +1,0 @@
-"""Motion of the pantographs' bases by the vehicle."""

@@ -1,1 +1,0 @@
-"""Attributes, arrays and growing tables in HDF5: checksums, chunks, blocks of rows."""

@@ -1,1 +1,0 @@
-"""Marches of several scenes that share a line, side by side in the lanes of vectors."""

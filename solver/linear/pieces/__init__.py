@@ -1,1 +1,0 @@
-"""Pieces of a long line: those that a window needs have matrices, factors and unit responses."""

@@ -1,1 +1,0 @@
-"""Matrices in blocks of stations: unknowns in vector lanes, like stations stored once."""
