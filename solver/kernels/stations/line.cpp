@@ -8,6 +8,24 @@
 
 namespace catenary {
 
+namespace {
+
+/// Put the unknowns of a station in the order of another station type, in which each of the n has
+/// this place in the given one, zero for those that it lacks.
+CATENARY_FOR_TARGETS
+void reorder(const int8_t* place, int64_t n, int64_t scenes, const double* given, double* found) {
+    with_lanes(scenes, [&](auto lanes) __attribute__((always_inline)) {
+        using All = SideBySide<lanes>;
+        for (int64_t u = 0; u < n; ++u) {
+            typename All::Numbers own{};
+            if (place[u] >= 0) own = All::at(given + lanes * place[u]);
+            All::at(found + lanes * u) = own;
+        }
+    });
+}
+
+}  // namespace
+
 Line::Line(std::vector<std::unique_ptr<Kernels>> kernels,
            std::vector<std::vector<int>> station_types, int scenes)
     : kernels_(std::move(kernels)), station_types_(std::move(station_types)), scenes_(scenes) {
@@ -74,18 +92,9 @@ int64_t Line::start_of(const Work& work, int64_t station) const {
     return is_end ? n_solved_ : work.factored.places.starts[station] * scenes_;
 }
 
-/// Put the unknowns of a station in the order of another station type, zero for those it lacks.
 void Line::reorder(int from, int to, const double* given, double* found) const {
-    const int8_t* place = &place_[(from * station_types_.size() + to) * kMostUnknowns];
-    const int64_t n = std::ssize(station_types_[to]);
-    with_lanes(scenes_, [&](auto lanes) {
-        using All = SideBySide<lanes>;
-        for (int64_t u = 0; u < n; ++u) {
-            typename All::Numbers own{};
-            if (place[u] >= 0) own = All::at(given + lanes * place[u]);
-            All::at(found + lanes * u) = own;
-        }
-    });
+    catenary::reorder(&place_[(from * station_types_.size() + to) * kMostUnknowns],
+                      std::ssize(station_types_[to]), scenes_, given, found);
 }
 
 void Line::convert(int from, int to, Station& station) const {
