@@ -24,7 +24,7 @@ from catenary.solver.tangents.set_up import Change
 # equal elements are equal then.
 _BITS = 40
 # Pairs of rows in a part of the line, whose stations a range that moves takes together.
-_PART = 128
+_PART = 192
 # Entries of a node of a wire: pairs beside its own, and their unknowns.
 _BESIDE, _UNKNOWN = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 1, 0, 1, 0, 1])
 _NO_NUMBERS = np.zeros(0, dtype=np.int64)
@@ -77,19 +77,28 @@ class _Nodes:
     before, after : (n,) the pairs of the nodes beside it, or the pair itself
     entries : (n_kinds, 6, 2, n_lanes) at both unknowns of the pair before, of its own and of the
         pair after
+    n_even : of the kinds that are between equal elements, the first ones
     """
 
     kind: np.ndarray
     before: np.ndarray
     after: np.ndarray
     entries: np.ndarray
+    n_even: int
 
     @property
     def numbers(self) -> np.ndarray:
-        """The six numbers of each kind (n_kinds, 6, n_lanes), see `native.ChangedRows`."""
-        return -np.stack(
-            [self.entries[:, at, row] for row in (0, 1) for at in (2 + row, 4, 5)], axis=1
+        """Numbers (n, n_lanes) of all kinds, see `native.ChangedRows`."""
+        even, uneven = np.split(-self.entries, [self.n_even])
+        six = np.stack([even[:, at, row] for row in (0, 1) for at in (2 + row, 4, 5)], axis=1)
+        n_lanes = self.entries.shape[-1]
+        return np.concatenate(
+            [six.reshape(-1, n_lanes), uneven.transpose(0, 2, 1, 3).reshape(-1, n_lanes)]
         )
+
+    def first_number(self, kind: np.ndarray) -> np.ndarray:
+        """Where the numbers of a kind (n,) begin, -1 of no node."""
+        return np.where(kind < 0, -1, 6 * kind + 6 * np.maximum(kind - self.n_even, 0))
 
 
 def changed_rows(
@@ -153,15 +162,17 @@ def _entries(
         numbers.append(np.full(term.values.size, number))
         values.append(_rounded(term.values))
     row = np.concatenate(rows)
-    # Each entry of a pair of rows once for all lanes, by pairs, terms and columns. With indices,
-    # marks are sorted by merging, which is fast as those of each matrix nearly are.
-    mark = (row // 2 * n_terms + np.concatenate(numbers)) * n + np.concatenate(columns)
-    marks, _, entry = np.unique(mark, return_index=True, return_inverse=True)
-    entries = np.zeros((marks.size, 2, n_lanes))
+    # Each entry of a pair of rows once for all lanes, by pairs, terms and columns, which are near.
+    ahead = np.concatenate(columns) - row // 2 * 2
+    reach = int(np.abs(ahead).max(initial=0))
+    mark = (row // 2 * n_terms + np.concatenate(numbers)) * (2 * reach + 1) + ahead + reach
+    is_entry = np.zeros((n + 1) // 2 * n_terms * (2 * reach + 1), dtype=bool)
+    is_entry[mark] = True
+    own, ahead = np.divmod(np.flatnonzero(is_entry), 2 * reach + 1)
+    entries = np.zeros((own.size, 2, n_lanes))
+    entry = np.cumsum(is_entry)[mark] - 1
     entries[entry, row % 2, np.concatenate(lanes)] = np.concatenate(values)
-    own, column = np.divmod(marks, n)
-    ahead = column - 2 * (own // n_terms)
-    return weights, _kinds(n_terms, own, ahead, entries, (n + 1) // 2)
+    return weights, _kinds(n_terms, own, ahead - reach, entries, (n + 1) // 2)
 
 
 def _kinds(
@@ -178,7 +189,7 @@ def _kinds(
 
 
 def _nodes(pairs: _Pairs, n_whole: int) -> _Nodes:
-    """Nodes of wires between two equal elements, of ``n_whole`` pairs with two rows."""
+    """Nodes of wires, of ``n_whole`` pairs with two rows."""
     pair, n_terms = pairs.pair, pairs.n_terms
     # Kinds with the entries of a beam that are even about the node.
     six = np.flatnonzero(pairs.counts == _BESIDE.size)
@@ -209,7 +220,20 @@ def _nodes(pairs: _Pairs, n_whole: int) -> _Nodes:
     is_between &= (high > pair[others]) & (high < n_whole)
     others, low, high = others[is_between], low[is_between], high[is_between]
     kind[others], before[others], after[others] = kind[outer[is_between]], low, high
-    return _Nodes(kind, before, after, entries[is_node][first])
+    even, n_even = entries[is_node][first], first.size
+
+    # Those of them that are between two different elements: deflections turn them.
+    ends = np.stack([low, pair[others], high], axis=1) - pair[others, None]
+    first, alike = kinds_of(np.c_[pairs.kinds[others], ends].astype(float))
+    at, which = pairs.of(pairs.kinds[others[first]])
+    unknowns = 2 * ends[first][:, _BESIDE] + _UNKNOWN
+    entry, place = np.nonzero(pairs.ahead[at, None] == unknowns[which])
+    uneven = np.zeros((first.size, *even.shape[1:]))
+    uneven[which[entry], place] = pairs.entries[at[entry]]
+    differs = uneven[:, 3, 0].any(axis=1)
+    number = n_even + np.cumsum(differs) - 1
+    kind[others[differs[alike]]] = number[alike[differs[alike]]]
+    return _Nodes(kind, before, after, np.concatenate([even, uneven[differs]]), n_even)
 
 
 def _runs(pairs: _Pairs, nodes: _Nodes) -> np.ndarray:
@@ -230,6 +254,7 @@ def _runs(pairs: _Pairs, nodes: _Nodes) -> np.ndarray:
     step = np.diff(pairs.pair[order], prepend=0)
     last, goes_on = order[:-1], np.zeros(order.size, dtype=bool)
     goes_on[1:] = joins[last] & (following[last] == order[1:]) & (kind[last] == kind[order[1:]])
+    goes_on[1:] &= kind[last] < nodes.n_even
     # Another distance to the next node is another run.
     goes_on[1:] &= ~goes_on[:-1] | (step[1:] == step[:-1])
     starts = np.flatnonzero(~goes_on)
@@ -237,7 +262,8 @@ def _runs(pairs: _Pairs, nodes: _Nodes) -> np.ndarray:
     first, last = order[starts], order[starts + sizes - 1]
     step = np.where(sizes > 1, step[np.minimum(starts + 1, order.size - 1)], 0)
     ends = [nodes.before[first], pairs.pair[first], after[last]]
-    return np.stack([*ends, sizes, step, kind[first], term[first]], axis=1)
+    numbers, is_even = nodes.first_number(kind[first]), kind[first] < nodes.n_even
+    return np.stack([*ends, sizes, step, numbers, is_even, term[first]], axis=1)
 
 
 def _further(

@@ -42,6 +42,11 @@ struct Walk {
         w0 = sums.at(before), r0 = sums.at(before + 1);
         w1 = sums.at(here), r1 = sums.at(here + 1);
     }
+    /// Go to the next node, where the sums are w2 and r2.
+    [[gnu::always_inline]] void go_on(int64_t next, const Numbers& w2, const Numbers& r2) {
+        before = here, here = next;
+        w0 = w1, r0 = r1, w1 = w2, r1 = r2;
+    }
 };
 
 /// Put minus the products of the nodes of a run, or add them; its numbers stay in registers.
@@ -56,18 +61,38 @@ template <int64_t L, bool Adds>
                   bent = SideBySide<L>::at(numbers + 5 * L);
     walk.begin(run, sums);
     const auto pass = [&](int64_t next) __attribute__((always_inline)) {
-        auto& [_, before, here, w0, r0, w1, r1] = walk;
+        const auto& [_, before, here, w0, r0, w1, r1] = walk;
         const Numbers w2 = sums.at(next), r2 = sums.at(next + 1);
         Numbers one = own * w1, other = own_turned * r1;
         double* to = loads + L * here;
         if (Adds) one += SideBySide<L>::at(to), other += SideBySide<L>::at(to + L);
         SideBySide<L>::at(to) = one + level * (w0 + w2) + turned * (r2 - r0);
         SideBySide<L>::at(to + L) = other + sloping * (w2 - w0) + bent * (r0 + r2);
-        before = here, here = next;
-        w0 = w1, r0 = r1, w1 = w2, r1 = r2;
+        walk.go_on(next, w2, r2);
     };
     for (int64_t k = 1; k < run.n; ++k) pass(walk.here + 2 * run.step);
     pass(2 * run.after);
+}
+
+/// The same of a node between different elements.
+template <int64_t L, bool Adds>
+[[gnu::always_inline]] inline void multiply_uneven(const ChangedRows::Run& run,
+                                                   const double* numbers, const Sums<L>& sums,
+                                                   Walk<L>& walk, double* loads) {
+    using Numbers = typename SideBySide<L>::Numbers;
+    walk.begin(run, sums);
+    const auto& [_, before, here, w0, r0, w1, r1] = walk;
+    const Numbers w2 = sums.at(2 * run.after), r2 = sums.at(2 * run.after + 1);
+    for (double* to = loads + L * here; to < loads + L * (here + 2); to += L) {
+        Numbers load =
+            SideBySide<L>::at(numbers) * w0 + SideBySide<L>::at(numbers + L) * r0 +
+            SideBySide<L>::at(numbers + 2 * L) * w1 + SideBySide<L>::at(numbers + 3 * L) * r1 +
+            SideBySide<L>::at(numbers + 4 * L) * w2 + SideBySide<L>::at(numbers + 5 * L) * r2;
+        if (Adds) load += SideBySide<L>::at(to);
+        SideBySide<L>::at(to) = load;
+        numbers += 6 * L;
+    }
+    walk.go_on(2 * run.after, w2, r2);
 }
 
 /// Subtract the products of a row's further entries.
@@ -94,16 +119,19 @@ void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t
             Walk<n> walk;
             for (int64_t r = rows.parts(part, 0); r < rows.parts(part + 1, 0); ++r) {
                 const auto& run = *reinterpret_cast<const ChangedRows::Run*>(rows.runs[r].data());
-                if (run.kind < 0) {
+                if (run.numbers < 0) {
                     std::fill_n(loads + 2 * n * run.first, 2 * n, 0.0);
                     continue;
                 }
                 const Sums<n> sums(rows.weights[run.term].data(), march);
-                const double* numbers = rows.numbers[6 * run.kind].data();
-                if (run.term == 0)
-                    multiply<n, false>(run, numbers, sums, walk, loads);
-                else
-                    multiply<n, true>(run, numbers, sums, walk, loads);
+                const double* numbers = rows.numbers[run.numbers].data();
+                const auto take = [&](auto adds) __attribute__((always_inline)) {
+                    if (run.is_even)
+                        multiply<n, adds>(run, numbers, sums, walk, loads);
+                    else
+                        multiply_uneven<n, adds>(run, numbers, sums, walk, loads);
+                };
+                run.term == 0 ? take(std::false_type{}) : take(std::true_type{});
             }
             for (int64_t r = rows.parts(part, 1); r < rows.parts(part + 1, 1); ++r)
                 multiply_further<n>(rows, rows.rows(r, 0), rows.rows(r, 1), march, loads);

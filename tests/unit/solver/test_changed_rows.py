@@ -64,20 +64,24 @@ def loads(rows: native.ChangedRows, x: np.ndarray, n_lanes: int) -> np.ndarray:
     n = x.shape[1]
     result = np.full((n + n % 2, n_lanes), np.nan)
     weights = np.reshape(rows.weights, (-1, 3, n_lanes))
-    numbers = np.reshape(rows.numbers, (-1, 6, n_lanes))
-    for before, first, after, size, step, kind, number in np.asarray(rows.runs):
-        if kind < 0:
+    numbers = np.reshape(rows.numbers, (-1, n_lanes))
+    for before, first, after, size, step, begin, is_even, number in np.asarray(rows.runs):
+        if begin < 0:
             result[2 * first : 2 * first + 2] = 0.0
             continue
         sums = np.einsum("cn,cl->nl", x, weights[number])
-        own, level, turned, own_turned, sloping, bent = numbers[kind]
         nodes = [before, *(first + step * np.arange(size)), after]
         for p, q, s in zip(nodes, nodes[1:], nodes[2:], strict=False):
             (w0, r0), (w1, r1), (w2, r2) = (sums[2 * k : 2 * k + 2] for k in (p, q, s))
-            product = [
-                own * w1 + level * (w0 + w2) + turned * (r2 - r0),
-                own_turned * r1 + sloping * (w2 - w0) + bent * (r0 + r2),
-            ]
+            if is_even:
+                own, level, turned, own_turned, sloping, bent = numbers[begin : begin + 6]
+                product = [
+                    own * w1 + level * (w0 + w2) + turned * (r2 - r0),
+                    own_turned * r1 + sloping * (w2 - w0) + bent * (r0 + r2),
+                ]
+            else:
+                twelve = numbers[begin : begin + 12].reshape(2, 6, n_lanes)
+                product = (twelve * [w0, r0, w1, r1, w2, r2]).sum(axis=1)
             at = slice(2 * q, 2 * q + 2)
             result[at] = product if number == 0 else result[at] + product
     further = np.reshape(rows.further, (-1, 3, n_lanes))
