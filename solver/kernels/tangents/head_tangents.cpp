@@ -47,8 +47,8 @@ void HeadTangents::keep() {
     }
 }
 
-void HeadTangents::predict(std::span<const HeadChange> changes, Array2<double> drives,
-                           Array2<const double> changed, const GapChange& gaps) {
+void HeadTangents::predict(std::span<const HeadChange> changes, const Array2<double>& drives,
+                           const Array2<const double>& changed, const GapChange& gaps) {
     for (size_t h = 0; h < n(); ++h) {
         const std::span<const double> drive = drives[h];
         std::span<const double> own;

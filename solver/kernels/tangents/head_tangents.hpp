@@ -39,8 +39,8 @@ class HeadTangents {
     /// Differentiate the step of each head without changes of contact forces, by the rows that
     /// drove the heads and their derivatives, no rows if these do not change. Heights and rates of
     /// the strips are added to `gaps`.
-    void predict(std::span<const HeadChange> changes, Array2<double> drives,
-                 Array2<const double> changed, const GapChange& gaps);
+    void predict(std::span<const HeadChange> changes, const Array2<double>& drives,
+                 const Array2<const double>& changed, const GapChange& gaps);
     /// Move the derivatives of the states by those of contact forces (n,).
     void move(std::span<const HeadChange> changes, std::span<const double> forces) const;
     /// Derivative of the mean height of a head's strips.

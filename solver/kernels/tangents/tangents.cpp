@@ -126,12 +126,12 @@ void TangentSteps::follow(const TangentGroup& group, int64_t number) {
     const Array2<double> forces{side_by_side_.data(), n, n_lanes},
         of_links{side_by_side_.data() + n * n_lanes, n_links, n_lanes};
     std::ranges::fill(side_by_side_, 0.0);
+    const Array2<double> drives = block().drives[number];
     for (int64_t s = 0; s < n_tangents; ++s) {
         const Tangent& tangent = group.tangents[s];
         const Motion own = lanes.at(s);
         for (auto* numbers : {&place_, &rate_}) std::ranges::fill(*numbers, 0.0);
-        heads_.predict(tangent.heads, block().drives[number], changed_drives(tangent, number),
-                       {place_, rate_});
+        heads_.predict(tangent.heads, drives, changed_drives(tangent, number), {place_, rate_});
         find_places(tangent, own, tangent.speed * time);
         solve(tangent, own);
         for (int64_t i : acting_.contacts) forces(i, s) = solution_[i];
