@@ -55,7 +55,7 @@ def test_cost_of_a_step_in_lanes(case: str) -> None:
             print(f"{case}, {target}: alone {single:.1f} us a step, in {len(shared.lanes)} lanes "
                   f"{lane:.1f} us a step and scene, {lane / single:.2f} of it")  # fmt: skip
             shared.destroy()
-            # Lanes take 0.6 to 0.95 of the time; a busy machine takes a quarter longer.
-            assert lane < 1.2 * single
+            # Lanes take 0.43 to 0.9 of the time; a busy machine takes a quarter longer.
+            assert lane < 1.15 * single
     finally:
         native.set_target(best)

@@ -55,6 +55,6 @@ def test_cost_of_eight_tangents(case: str) -> None:
         own = (whole - alone) / len(keys)
         print(f"{what}: {own:.1f} us a step and tangent, {own / alone:.2f} times that, ", end="")
         print(f"{whole / alone:.1f} marches in all; set-ups {set_up:.0f} ms each")
-        # Measured: 0.2 to 0.35, and 0.4 to 0.6 in vectors of four; a busy machine takes a quarter
+        # Measured: 0.2 to 0.33, and 0.37 to 0.56 in vectors of four; a busy machine takes a quarter
         # longer.
-        assert own < 0.8 * alone
+        assert own < 0.72 * alone
