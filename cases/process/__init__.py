@@ -1,1 +1,1 @@
-"""The process of a run: signals, PETSc's options, memory limit, versions."""
+"""The process of a run: signals, libraries and PETSc's options, further processes beside it."""

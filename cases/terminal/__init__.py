@@ -1,1 +1,1 @@
-"""Tables, messages and completion that the verbs share."""
+"""Tables, messages and errors that the verbs show, and their exit codes."""

@@ -13,6 +13,7 @@ from catenary.solver.effects.shipped import (  # noqa: F401  (registers)
     axial_effects,
     defect_effects,
     end_effects,
+    hardware_effects,
     lateral_effects,
     pantograph_effects,
     stiff_link_effects,

@@ -1,4 +1,4 @@
-"""Pages of the documentation: their equations, files that they name, and the site's own parts."""
+"""Pages of the documentation: equations, files and names of code; and the site's own parts."""
 
 from __future__ import annotations
 
@@ -23,6 +23,19 @@ _FILE = re.compile(rf"`((?:{_FOLDERS.replace('.', chr(92) + '.')})/[\w./-]+\.\w+
 _EQUATION = re.compile(r"\$\$(.+?)\$\$|(?<![\\$])\$(?!\s)([^$\n]+?)(?<!\s)\$", re.S)
 # The worked example of an effect, which a test registers from outside the package.
 EXAMPLE = {"solver/effects/shipped/lateral_wind.py"}
+# Files named by the ends of their paths, and folders; those of other programs are none here.
+_SHORT = re.compile(r"`([\w./-]+\.(?:py|cpp|hpp)|(?:solver|mbs|meshgen|postproc)/[\w/]+)`")
+OTHERS = {"procs.py", "view.py", "test_NAME.py", *EXAMPLE}
+_DOTTED = re.compile(r"`([a-z_]+)\.([A-Za-z_]\w*)\b(?!\.py)")
+# Objects that are called as a module is; ends of files that are.
+OBJECTS = {"evaluation", "heads", "line", "options", "pantographs", "run", "table"}
+ENDS = {"csv", "json", "html", "png", "mp4", "gif", "py", "toml"}
+PRODUCT = [
+    path
+    for part in ("solver", "mbs", "meshgen", "postproc", "cases")
+    for path in sorted((ROOT / part).rglob("*"))
+    if path.suffix in (".py", ".cpp", ".hpp")
+]
 
 
 def part_of_site(name: str) -> ModuleType:
@@ -42,6 +55,31 @@ def label(path: Path) -> str:
 def test_files_that_a_page_names_are_there(page: Path) -> None:
     named = set(_FILE.findall(page.read_text(encoding="utf-8"))) - EXAMPLE
     assert {name for name in named if not (ROOT / name).is_file()} == set()
+
+
+def test_what_a_page_names_by_the_end_of_its_path_is_there() -> None:
+    files = [*PRODUCT, *ROOT.glob("*.py"), *ROOT.glob(".s*/*.py"), *ROOT.glob("tests/**/*.py")]
+    there = {f"/{label(path)}" for path in files}
+    for page in PAGES:
+        named = set(_SHORT.findall(page.read_text(encoding="utf-8"))) - OTHERS
+        gone = {one for one in named if not any(path.endswith(f"/{one}") for path in there)}
+        gone = {one for one in gone if not (ROOT / one).is_dir()}
+        assert gone == set(), page
+
+
+def test_what_a_comment_names_by_its_module_is_there() -> None:
+    """``module.name`` stands in the module, ``package.module`` in the package."""
+    words: dict[str, set[str]] = {}
+    texts = {path: path.read_text(encoding="utf-8") for path in PRODUCT}
+    for path, text in texts.items():
+        words.setdefault(path.stem, set()).update(re.findall(r"\w+", text))
+        for inner in (path, path.parent):
+            words.setdefault(inner.parent.name, set()).add(inner.stem)
+    words["kernels"].add("native")
+    for path, text in ((path, text) for path, text in texts.items() if path.suffix == ".py"):
+        for module, name in _DOTTED.findall(text):
+            known = {name} if module in OBJECTS else words.get(module, {name})
+            assert name in known | ENDS, f"{path}: {module}.{name}"
 
 
 @pytest.mark.parametrize("page", THEORY, ids=label)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from scenes import Scene, line_of, load_scene, resolved
 
 from catenary import InputError
 from catenary.cases.run.at_rest import static_table
+from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.turned import has_mirrored_line, turned
 
 # Spans of two lengths in an order of their own, droppers that are no mirror image of themselves.
@@ -42,6 +44,31 @@ def scene_of(*assignments: str) -> Scene:
 def plain(scene: Scene) -> dict[str, Any]:
     raw = resolved(scene)
     return {key: value for key, value in raw.items() if key not in ("output", "test")}
+
+
+# Last words of keys that say a place along the track.
+PLACE = re.compile(
+    r"(at|from|to|course|stretches|\w*positions|\w*points)_m|by_place|by_dropper|span"
+)
+
+
+def test_all_places_along_the_track_are_turned_or_refused() -> None:
+    """A table with a place, and no line here, is one that trains backward would meet as it was."""
+    outside = ("case", "train", "pantographs", "evaluation", "output", "test", "numerics")
+    found = {
+        key.rpartition(".")[0]
+        for key in known_keys(Scene)
+        if key.partition(".")[0] not in outside and PLACE.fullmatch(key.rpartition(".")[2])
+    }
+    dropper, hung = "line.dropper", "line.auxiliary_wire.dropper"
+    turned_by_name = {"line", "line.curve", "line.fittings.*", "line.tunnels.*", "wind.stretches.*"}
+    turned_by_name |= {one for own in (dropper, hung) for one in (own, f"{own}.patterns.*")}
+    turned_by_name |= {
+        f"irregularities.{name}" for name in ("contact_wire_height", "running_surface")
+    }
+    turned_by_name |= {"irregularities.dropper_lengths", "vehicle.vertical", "vehicle.lateral"}
+    free = {"line.wires.*", "line.links.*", "line.links.*.patterns.*"}
+    assert found == turned_by_name | {"defects.*", "incidents.*"} | free
 
 
 def test_a_line_that_is_turned_hangs_as_its_mirror_image() -> None:

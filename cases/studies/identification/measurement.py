@@ -186,7 +186,7 @@ class Measurement:
 
     Parameters
     ----------
-    table : of a CSV file, see ``passages.read_table``
+    table : of a CSV file, see ``measured.read_table``
     path : its name in sentences
     task : description of its columns
     speed : of the train [m/s]

@@ -314,7 +314,7 @@ class Uncertainty:
     quantiles : of each statistic with bounds
     probabilities : that acceptance criteria fail, with bounds
     method : of the sensitivity indices
-    sensitivity : rows of ``sensitivity.indices``
+    sensitivity : rows of ``indices``
     remarks : remarks on runs, and the number of runs with each, the most frequent first
     notes : sentences on what is left out
     is_sampled : whether the inputs are known to be samples, so that shares are probabilities

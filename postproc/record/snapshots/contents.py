@@ -162,7 +162,8 @@ class FieldKind:
     unit : SI unit, "-" if none
     meaning : description with its sign, in words
     components : numbers of a value
-    motions : unknowns that it takes at all nodes, each with whether their rate is meant
+    motions : unknowns that it takes at all nodes, each with whether their rate is meant: of a field
+        that is motion itself those of its components
     of_wires : whether wires alone have it, and not other blocks that move
     of_droppers : whether it belongs to the cells of the droppers
     only_with : unknown without which it takes no motion, "" if it always does
@@ -210,14 +211,14 @@ KINDS: dict[str, FieldKind] = {
             "m",
             "displacement from rest along x, y, z",
             components=3,
-            motions=((UP, False), (ASIDE, False), (ALONG, False)),
+            motions=((ALONG, False), (ASIDE, False), (UP, False)),
         ),
         FieldKind(
             "velocity",
             "m/s",
             "velocity along x, y, z",
             components=3,
-            motions=((UP, True), (ASIDE, True), (ALONG, True)),
+            motions=((ALONG, True), (ASIDE, True), (UP, True)),
         ),
         FieldKind(
             "tension",

@@ -91,9 +91,7 @@ class FieldValues:
             return [(self._tension(block, known), np.arange(block.nodes.size))]
         if kind.name == "bending_moment":
             return [(self._bending_moment(block, known), np.arange(block.nodes.size))]
-        rate = kind.motions[0][1]
-        names = (ALONG, ASIDE, UP) if kind.components > 1 else (UP,)
-        return [(known.motions.get((name, rate)), block.nodes) for name in names]
+        return [(known.motions.get(motion), block.nodes) for motion in kind.motions]
 
     def _tension(self, block: Block, known: Gathered) -> np.ndarray:
         """Tension ahead of the points of a wire, (rows, n) [N]."""

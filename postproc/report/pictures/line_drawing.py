@@ -18,12 +18,8 @@ from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.report.pictures.figures import COLOURS, GREY, LIGHT, own_style
 from catenary.solver.statics.form_finding import Equilibrium
 
-_COLOUR = {
-    Role.CONTACT: COLOURS[1],
-    Role.MESSENGER: COLOURS[0],
-    Role.AUXILIARY: COLOURS[2],
-    Role.STITCH: COLOURS[3],
-}
+# Of contact wires, messenger wires, and all further roles in their order.
+_COLOUR = dict(zip(Role, (COLOURS[1], COLOURS[0], *COLOURS[2:]), strict=False))
 # Exaggerations of heights and lateral positions, and sizes of figure and panels [inch].
 _FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _WIDTH, _HEIGHT = 9.0, 6.7

@@ -1,1 +1,1 @@
-"""Sections of a run's report, one file each."""
+"""Sections of a run's report, one subject a file."""

@@ -1,4 +1,4 @@
-"""The effects that Catenary ships, in building order. Importing this module registers them."""
+"""Effects of every line and train: motion in height, weight, damping, contact, incidents."""
 
 from __future__ import annotations
 

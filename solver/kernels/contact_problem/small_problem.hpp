@@ -120,7 +120,7 @@ bool under(const Affine& gap, const LinkRows& rows, std::span<const double> forc
 bool leaves_out(std::span<const double> force, std::span<const double> compensation,
                 const LinkRows& rows, const Bounds& bounds, const Coupled& coupled);
 
-/// Counts of the work of steps, as in `schemes.Counters`.
+/// Counts of the work of steps, as in `scheme.Counters`.
 struct Counts {
     int64_t steps;     ///< that were taken
     int64_t rounds;    ///< of the active-set iteration

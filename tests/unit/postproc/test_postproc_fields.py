@@ -8,11 +8,20 @@ from typing import Any
 
 import h5py
 import numpy as np
+import pytest
 import pyvista
 from watched_fields import BLOCKS, blocks_at, times_in, watch
 
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE
-from catenary.postproc.record.snapshots.contents import ARMS, FIELDS, MASTS, blocks_of
+from catenary.postproc.record.snapshots.contents import (
+    ARMS,
+    FIELDS,
+    KINDS,
+    MASTS,
+    SLOPE,
+    FieldKind,
+    blocks_of,
+)
 from catenary.postproc.record.snapshots.field_layout import BlockTables, Course, FieldRecord
 from catenary.postproc.record.snapshots.field_values import bending_moment
 from catenary.postproc.record.snapshots.fields import FieldRecorder
@@ -105,6 +114,21 @@ def test_all_fields_have_their_values(tmp_path: Path, make_march: Any) -> None:
 
 
 NO_BREAKS = np.zeros(0, dtype=int)
+
+
+def test_a_field_of_another_unknown_is_one_row(
+    tmp_path: Path, make_march: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Such as a turn of the wire: not what nodes do in height."""
+    kind = FieldKind("turn", "rad", "slope of the wire", motions=((SLOPE, False),), of_wires=True)
+    monkeypatch.setitem(KINDS, kind.name, kind)
+    march, path = make_march(n_steps=100), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path, record=FieldRecord(("uplift", kind.name))))
+    blocks = blocks_at(path, 0.1)
+    for name, nodes in march.mesh.wires.items():
+        slope = march.motion(0.1, march.mesh.points[nodes, 0], SLOPE, False)
+        np.testing.assert_allclose(blocks[name].point_data[kind.name], slope, atol=1e-8)
+    assert kind.name not in blocks[DROPPERS].point_data.keys()
 
 
 def test_moment_of_a_cubic_is_that_of_the_cubic() -> None:

@@ -24,7 +24,7 @@ from catenary.postproc.files.own_files import (
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.problem.watched_links import GAUGES
+from catenary.solver.time_loop.views.channels import CHANNELS, TrainLayout
 
 
 def recorder(march: Any, path: Path, **options: Any) -> Recorder:
@@ -195,8 +195,9 @@ def test_a_reports_files_are_all_declared(tmp_path: Path, make_march: Any, recor
     written = {one.name for one in write_report(path, tmp_path).files}
     assert written <= set(REPORT_FILES)
     # All else is declared because other runs have it.
-    lateral = "lateral_place", "lateral_displacement"
-    missing = {f"channel_{name}" for name in (*GAUGES, *lateral, "stop_force")}
+    missing = {
+        f"channel_{name}" for name, one in CHANNELS.items() if not one.when(TrainLayout((1,)))
+    }
     missing |= {"strip_forces", "wire_forces", "lateral_place", "plan_view", "worst_support"}
     for section in ("spectrum", "waves", "worst", "line", "pantographs"):
         missing |= set(PICTURES[section])
