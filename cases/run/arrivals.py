@@ -31,6 +31,7 @@ FELT = 1e-3
 START_SHARE = 0.8
 # Above this share of the standard deviation the run-in counts as short [-].
 SHORT_RUN_IN = 0.2
+SIDES = ("start", "end")
 
 
 class WaveLine(NamedTuple):
@@ -193,9 +194,6 @@ def end_for(line: WaveLine, course: Course) -> float:
 
 def _within(met: Meeting | None, course: Course) -> Meeting | None:
     return met if met is not None and met.at <= course.end else None
-
-
-SIDES = ("start", "end")
 
 
 def end_sentences(problem: Problem) -> tuple[str, str]:

@@ -51,6 +51,14 @@ _LIMITS = (
 # Shares that differ by less are one: a tensioner keeps to the edge of its band.
 _SAME = 1e-6
 _OF = {"largest": "", "along": " along the wire", "at_tensioners": " at its tensioner"}
+# Steps between temperatures [K], of which a range has no more than so many.
+_STEPS, _MOST_STEPS = (0.1, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0), 8
+# Differences that a scene may have [K].
+_LEAST, _MOST = -100.0, 150.0
+_EFFECTS = ("axial_motion", "temperature")
+DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
+DROPPER_WIRES = ("dropper_upper", "dropper_lower")
+_DROPPER_HEADS = ("span", "x_m", "length_m", "force_N", "from_wire", "to_wire")
 
 
 def temperature_text(rests: Sequence[LineAtTemperature], ratio: float) -> str:
@@ -103,13 +111,6 @@ def _remarks(rests: Sequence[LineAtTemperature]) -> Iterator[str]:
                     f"{name}: at {warmer:+g} K the tension changes by {100 * value:.1f} %"
                     f"{_OF[what]}, more than {source}"
                 )
-
-
-# Steps between temperatures [K], of which a range has no more than so many.
-_STEPS, _MOST_STEPS = (0.1, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0), 8
-# Differences that a scene may have [K].
-_LEAST, _MOST = -100.0, 150.0
-_EFFECTS = ("axial_motion", "temperature")
 
 
 def range_of(text: str) -> list[float]:
@@ -167,11 +168,6 @@ def temperatures(scene: Scene, differences: Sequence[float], picture: Path | Non
         drawn = file_of(draw_temperatures(rests), picture.name)
         write_into(picture.parent, {picture.name: drawn})
     return temperature_text(rests, problem.along.tensioner.ratio)
-
-
-DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
-DROPPER_WIRES = ("dropper_upper", "dropper_lower")
-_DROPPER_HEADS = ("span", "x_m", "length_m", "force_N", "from_wire", "to_wire")
 
 
 def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:

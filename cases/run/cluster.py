@@ -44,6 +44,12 @@ _BYTES, _FLAGS, _HEAD, _LINKS = 8, 4, 4, 32
 # Time that a step takes longer by itself, as on several ranks, than in a block of steps: measured
 # on lines of 25 to 1000 spans before and after there were blocks [s].
 _ONE_BY_ONE = 1e-5
+# Factor on the estimate of a job's time, the most that a start and a report take, and the
+# least that a job asks for [s].
+_SPARE, _AROUND, _LEAST = 3.0, 180.0, 600.0
+# Time before its limit at which a job gets the signal to end: a step, a flush and the report [s].
+NOTICE = 120
+_GB = 1e9
 
 
 class Wire(NamedTuple):
@@ -158,14 +164,6 @@ def march_on(problem: Problem, needs: Needs, n_unknowns: int, ranks: int) -> flo
     if ranks == 1 or problem.window.moves:
         return needs.march
     return needs.n_steps * predict(work_in(problem, needs, n_unknowns), USUAL, ranks).step
-
-
-# Factor on the estimate of a job's time, the most that a start and a report take, and the
-# least that a job asks for [s].
-_SPARE, _AROUND, _LEAST = 3.0, 180.0, 600.0
-# Time before its limit at which a job gets the signal to end: a step, a flush and the report [s].
-NOTICE = 120
-_GB = 1e9
 
 
 @dataclass(frozen=True)

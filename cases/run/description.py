@@ -41,6 +41,12 @@ from catenary.solver.problem.problem import Placement, Problem
 if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
 
+_WHAT = {
+    "contact_wire_height": "droppers are cut for irregular heights of the contact wire",
+    "running_surface": "running surface of the contact wire",
+    "dropper_lengths": "errors of the droppers' lengths",
+}
+
 
 def description_of(data: PantographData, static_force: float) -> str:
     """A line about a pantograph."""
@@ -151,13 +157,6 @@ def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
         if defect.type in problem.effects:
             found.append({"type": defect.type, **_defect(defect, line)})
     return found
-
-
-_WHAT = {
-    "contact_wire_height": "droppers are cut for irregular heights of the contact wire",
-    "running_surface": "running surface of the contact wire",
-    "dropper_lengths": "errors of the droppers' lengths",
-}
 
 
 def _heights(table: HeightTable, line: Line) -> str:

@@ -64,6 +64,17 @@ _REPORT, _REPORT_PER_DROPPER, _REPORT_PER_ARM = 1.2e6, 300.0, 90.0
 _FIELD_TABLES = 90e3
 # Lines of a block in the XDMF file at each snapshot, and of each of its fields [B].
 _XDMF_BLOCK, _XDMF_FIELD = 600, 250
+# Time between two flushes of the result file at full speed, each of which takes some 5 ms [s], and
+# what may wait for one in memory [B].
+FLUSH_EVERY = 0.2
+FLUSH_MEMORY = 1e8
+# Time to write the state to continue from [s an unknown], and what it may take of a march with a
+# window.
+STATE_PER_UNKNOWN, STATE_SHARE = 1e-7, 0.05
+# Steps of a flush whose chunks are not too small.
+LEAST_FLUSH = 256
+_BYTES_OF_A_NUMBER = 8
+_PER_PANTOGRAPH = 8  # channels of a pantograph, mostly at most
 
 
 @dataclass(frozen=True)
@@ -224,20 +235,6 @@ class _Moving(NamedTuple):
         low, high = self.edges(rows, rows, window)
         inside = np.searchsorted(x, high, side="right") - np.searchsorted(x, low)
         return float(inside.mean()) * self.n_rows
-
-
-# Time between two flushes of the result file at full speed, each of which takes some 5 ms [s], and
-# what may wait for one in memory [B].
-FLUSH_EVERY = 0.2
-FLUSH_MEMORY = 1e8
-# Time to write the state to continue from [s an unknown], and what it may take of a march with a
-# window.
-STATE_PER_UNKNOWN, STATE_SHARE = 1e-7, 0.05
-# Steps of a flush whose chunks are not too small.
-LEAST_FLUSH = 256
-
-_BYTES_OF_A_NUMBER = 8
-_PER_PANTOGRAPH = 8  # channels of a pantograph, mostly at most
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,32 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
+# Data that an effect lacks, if it does not name them itself.
+_NO_DATA = "the scene has no data for it"
+# The scene as it is, among the names of runs: no effect has a hyphen in its name.
+AS_IT_IS = "as-it-is"
+# Steps of a round at least, some milliseconds, and at most; a span between them.
+_FEWEST, _MOST = 200, 4000
+# The statistics that are compared, of a pantograph and of the line.
+FIGURES = ("mean_N", "std_N", "max_N", "min_N")
+UPLIFT = "max_uplift_mm"
+TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
+# In the column "simulated": the scene simulates the effect.
+LEFT_OUT = "left out"
+# Heads of the figures in a table, and their names in sentences.
+_HEADS = {"mean_N": "mean", "std_N": "sigma", "max_N": "max", "min_N": "min", UPLIFT: "uplift"}
+# A ratio of times that is none: what clocks and caches make of equal steps.
+_SAME_COST = 0.03
+# A share of a figure below which digits are noise of no use to anybody.
+_NOTHING = 5e-5
+_WORDS = {
+    "mean_N": "the mean",
+    "std_N": "sigma",
+    "max_N": "the maximum",
+    "min_N": "the minimum",
+    UPLIFT: "the uplift",
+}
+
 
 class Size(NamedTuple):
     """Unknowns of a line, of its stations (fewest, most), and of a cross-section by planes."""
@@ -160,10 +186,6 @@ def in_turns(marches: Mapping[str, RepeatedMarch], rounds: int) -> dict[str, flo
     return least
 
 
-# Data that an effect lacks, if it does not name them itself.
-_NO_DATA = "the scene has no data for it"
-
-
 @dataclass(frozen=True)
 class Switch:
     """One effect switched the other way.
@@ -244,15 +266,6 @@ def _taken_along(name: str, among: Iterable[str], takes: Callable[[str, str], bo
         found.update(new)
         ahead += new
     return [other for other in left if other in found]
-
-
-# The scene as it is, among the names of runs: no effect has a hyphen in its name.
-AS_IT_IS = "as-it-is"
-# Steps of a round at least, some milliseconds, and at most; a span between them.
-_FEWEST, _MOST = 200, 4000
-# The statistics that are compared, of a pantograph and of the line.
-FIGURES = ("mean_N", "std_N", "max_N", "min_N")
-UPLIFT = "max_uplift_mm"
 
 
 @dataclass(frozen=True)
@@ -470,24 +483,6 @@ def _round_of(problem: Problem) -> tuple[int, int]:
     begin = round((problem.evaluation[0] - train.start) / train.speed / dt)
     first = max(0, min(begin, steps_of(problem) - n_steps))
     return first, min(n_steps, steps_of(problem) - first)
-
-
-TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
-# In the column "simulated": the scene simulates the effect.
-LEFT_OUT = "left out"
-# Heads of the figures in a table, and their names in sentences.
-_HEADS = {"mean_N": "mean", "std_N": "sigma", "max_N": "max", "min_N": "min", UPLIFT: "uplift"}
-# A ratio of times that is none: what clocks and caches make of equal steps.
-_SAME_COST = 0.03
-# A share of a figure below which digits are noise of no use to anybody.
-_NOTHING = 5e-5
-_WORDS = {
-    "mean_N": "the mean",
-    "std_N": "sigma",
-    "max_N": "the maximum",
-    "min_N": "the minimum",
-    UPLIFT: "the uplift",
-}
 
 
 class Change(NamedTuple):

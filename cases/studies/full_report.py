@@ -88,6 +88,14 @@ _COLUMNS = {
     "force_min": "error_min_N",
     "arm_uplift": "error_uplift_mm",
 }
+# Places along the track closer than this are one, contact wires whose heights differ less are met
+# together [m].
+_OFF, _ALIKE = 1e-6, 1e-3
+# Length that is shown beside a dropper and its extreme [m], and number of places in tables.
+_BESIDE, _MOST = 30.0, 5
+_HEADING = "Validation by EN 50318"
+# Snapshots times length of the line [m] of a picture that is quickly drawn.
+_LARGEST = 1e7
 
 
 class SceneOfRun:
@@ -210,11 +218,6 @@ def _rows_of(path: Path, verb: str, scene: Scene) -> list[dict[str, Any]]:
                 f"{path} is a study with {key} = {shown(there)}, the run is one with {shown(here)}"
             )
     return rows
-
-
-# Places along the track closer than this are one, contact wires whose heights differ less are met
-# together [m].
-_OFF, _ALIKE = 1e-6, 1e-3
 
 
 def line_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
@@ -461,10 +464,6 @@ def _drawn_pantograph(data: Any) -> Figure:
     return figure
 
 
-# Length that is shown beside a dropper and its extreme [m], and number of places in tables.
-_BESIDE, _MOST = 30.0, 5
-
-
 def worst_section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
     """The worst places of the evaluated stretch.
 
@@ -587,9 +586,6 @@ def _passage(results: Results, spot: Spot) -> Figure:
     return figure
 
 
-_HEADING = "Validation by EN 50318"
-
-
 def statement_in(folder: Path) -> dict[str, Any]:
     """The statement that a folder of `catenary validate -o FOLDER` holds. Not collective.
 
@@ -644,10 +640,6 @@ def _statement_blocks(
     if failed:
         yield readers_table(failed, "Figures beyond their limits")
     yield Text(" ".join(statement["closing"]))
-
-
-# Snapshots times length of the line [m] of a picture that is quickly drawn.
-_LARGEST = 1e7
 
 
 def _waves_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:

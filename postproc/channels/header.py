@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from catenary.solver.statics.elasticity import Elasticity
     from catenary.solver.statics.form_finding import Equilibrium
 
+NONE, GZIP = "none", "gzip"
+# Level 4 was not smaller than level 1 on the forces of droppers, and slower.
+GZIP_LEVEL = 1
+
 
 @dataclass(frozen=True)
 class Header:
@@ -144,11 +148,6 @@ def _registration(line: Line, mesh: LineMesh, form: Equilibrium) -> dict[str, np
         "static/arm_force": force,
         "static/arm_tension": tension,
     }
-
-
-NONE, GZIP = "none", "gzip"
-# Level 4 was not smaller than level 1 on the forces of droppers, and slower.
-GZIP_LEVEL = 1
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,10 @@ _FORCES = (
 
 
 _Evaluated = tuple[Results, stats.RunStatistics]
+_WORDS = {True: "passed", False: "FAILED", None: "not judged"}
+# With fewer spans nothing is said.
+_LEAST_SPANS = 4
+STATISTICS = ("mean", "standard deviation")
 
 
 def compare(*runs: Path | str, records: Sequence[Records | None] | None = None) -> str:
@@ -144,9 +148,6 @@ def _statistics(runs: Sequence[_Evaluated]) -> list[str]:
         for letter, (run, _) in zip(letters, runs, strict=True)
         for text in all_remarks(run, indicate(run))
     ]
-
-
-_WORDS = {True: "passed", False: "FAILED", None: "not judged"}
 
 
 def _acceptance(*runs: _Evaluated) -> list[str]:
@@ -287,11 +288,6 @@ def _histories(a: Results, b: Results, letter: str) -> str:
         f"{of_all}Largest difference of the contact force histories: {_difference(largest)} N "
         f"at t = {a.time_at(at):.4f} s ({a.pantograph_names()[whose]})."
     )
-
-
-# With fewer spans nothing is said.
-_LEAST_SPANS = 4
-STATISTICS = ("mean", "standard deviation")
 
 
 class SpanSums(NamedTuple):

@@ -30,6 +30,8 @@ from catenary.postproc.read.results import Results, in_stretch
 SHORTEST_ARC = 5e-3
 HISTOGRAM_BIN, MOST_BINS = 10.0, 1000
 _NAN = float("nan")
+# Standard deviations from the mean to statistical extremes.
+_STATISTICAL = 3.0
 
 
 @dataclass(frozen=True)
@@ -454,10 +456,6 @@ def lateral_table(ranges: list[LateralRange]) -> list[dict[str, Any]]:
         }
         for p in ranges
     ]
-
-
-# Standard deviations from the mean to statistical extremes.
-_STATISTICAL = 3.0
 
 
 class ForceDerivatives(NamedTuple):

@@ -16,6 +16,12 @@ from typing import TextIO
 # Stands behind a limit that was not compared with the text of its standard, and explains itself.
 UNCOMPARED = "*"
 UNCOMPARED_SAYS = f"{UNCOMPARED} limit not compared with the text of the standard"
+# Further digits after which two numbers are printed in full.
+_MOST_MORE = 9
+# Columns of which a terminal has at least so many: narrower text is harder to read than torn lines.
+_FEWEST = 40
+# Blanks that stay within a line: before a unit, and before a mark at the end.
+_KEPT = re.compile(r"(?<=\d) (?=(?:%|°|\w{1,2}(?:/\w+)?)(?!\w))| (?=\*$)")
 
 
 def fixed(value: float, digits: int) -> str:
@@ -68,10 +74,6 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60.0:.2g} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
-# Further digits after which two numbers are printed in full.
-_MOST_MORE = 9
-
-
 def decimals_that_tell(value: float | None, limit: float | None, fewest: int) -> int:
     """Decimals of a value and its limit with which different numbers print differently.
 
@@ -90,12 +92,6 @@ def decimals_that_tell(value: float | None, limit: float | None, fewest: int) ->
         if f"{value:.{decimals}f}" != f"{limit:.{decimals}f}":
             return decimals
     return fewest + _MOST_MORE
-
-
-# Columns of which a terminal has at least so many: narrower text is harder to read than torn lines.
-_FEWEST = 40
-# Blanks that stay within a line: before a unit, and before a mark at the end.
-_KEPT = re.compile(r"(?<=\d) (?=(?:%|°|\w{1,2}(?:/\w+)?)(?!\w))| (?=\*$)")
 
 
 def terminal_width(stream: TextIO | None = None) -> int | None:

@@ -43,6 +43,11 @@ from catenary.postproc.files.run_schema import CLOCKS, COMPLETE
 
 _EXTREMES, ROWS = "extremes", "rows"
 _SLOTS = ("0", "1")
+logger = logging.getLogger("catenary.results")
+_FILTERED = "filtered"
+PATH = f"{_FILTERED}/contact_force"
+# Names of the attributes of the table that name its filter.
+_ABOUT = ("filter", "cut_off_Hz", "order")
 
 
 def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarray]) -> None:
@@ -99,14 +104,6 @@ def _rows_of(slot: h5py.Group) -> int:
     if not isinstance(rows, h5py.Dataset) or rows.shape != () or rows.dtype.kind not in "iu":
         return -1
     return int(rows[()])
-
-
-logger = logging.getLogger("catenary.results")
-
-_FILTERED = "filtered"
-PATH = f"{_FILTERED}/contact_force"
-# Names of the attributes of the table that name its filter.
-_ABOUT = ("filter", "cut_off_Hz", "order")
 
 
 class ForceFilter(NamedTuple):

@@ -30,6 +30,30 @@ from h5py import h5a, h5d, h5l, h5o, h5p, h5s, h5t
 
 from catenary.base.errors import InputError
 
+# The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
+# one marks a file as open for writing: after a kill nobody could open it.
+FORMAT_BOUNDS = ("v108", "v108")
+# Exceptions of HDF5 and h5py at a damaged file.
+HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
+# Attribute with the checksums of the other attributes, by name, as JSON.
+ATTRIBUTE_SUMS = "attribute_crc32"
+# Attribute of a group with one checksum of all its arrays.
+ARRAYS_SUM = "crc32"
+# Description of a link or a table that leads elsewhere, in the error.
+_LINKS = {h5l.TYPE_SOFT: "is a soft link", h5l.TYPE_EXTERNAL: "is a link into another file"}
+_OWN_KINDS = {
+    stat.S_IFLNK: "is a symbolic link, and result files are not opened through links; name the "
+    "folder in which the file itself lies",
+    stat.S_IFDIR: "is a folder",
+}
+_NO_FILTER = 0xFFFFFFFF
+# Largest size of a block of rows [B].
+BLOCK_BYTES = 16e6
+# Columns of a wide table that are read at once.
+COLUMNS_AT_ONCE = 256
+# Rows of a column that are read at once.
+_SLICE = 1 << 18
+
 
 def put_array(group: h5py.Group, name: str, values: Any) -> h5d.DatasetID:
     """Store an array in place of an earlier one of its name; returns its table.
@@ -108,17 +132,6 @@ def _number_type(dtype: np.dtype) -> h5t.TypeID:
 def _text_type(size: int) -> tuple[np.dtype, h5t.TypeID]:
     kind = h5py.string_dtype("utf-8", size)
     return kind, h5t.py_create(kind, logical=True)
-
-
-# The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
-# one marks a file as open for writing: after a kill nobody could open it.
-FORMAT_BOUNDS = ("v108", "v108")
-# Exceptions of HDF5 and h5py at a damaged file.
-HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
-# Attribute with the checksums of the other attributes, by name, as JSON.
-ATTRIBUTE_SUMS = "attribute_crc32"
-# Attribute of a group with one checksum of all its arrays.
-ARRAYS_SUM = "crc32"
 
 
 def text_of(value: Any) -> Any:
@@ -219,15 +232,6 @@ def _sum_of(value: Any) -> int:
     return zlib.crc32(repr(value).encode())
 
 
-# Description of a link or a table that leads elsewhere, in the error.
-_LINKS = {h5l.TYPE_SOFT: "is a soft link", h5l.TYPE_EXTERNAL: "is a link into another file"}
-_OWN_KINDS = {
-    stat.S_IFLNK: "is a symbolic link, and result files are not opened through links; name the "
-    "folder in which the file itself lies",
-    stat.S_IFDIR: "is a folder",
-}
-
-
 def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:
     """An HDF5 file all of whose tables lie in itself, open for reading or for changes.
 
@@ -307,9 +311,6 @@ def _oversize(name: bytes, table: h5d.DatasetID, size: int) -> str | None:
 
 def _text(name: bytes) -> str:
     return name.decode(errors="replace")
-
-
-_NO_FILTER = 0xFFFFFFFF
 
 
 def append_rows(dataset: h5py.Dataset, start: int, rows: np.ndarray) -> None:
@@ -415,14 +416,6 @@ def _mend_end(table: h5py.Dataset, rows: int) -> int:
             table.id.write_direct_chunk((begin, first)[: table.ndim], empty.tobytes(), _NO_FILTER)
             lost = rows - begin
     return lost
-
-
-# Largest size of a block of rows [B].
-BLOCK_BYTES = 16e6
-# Columns of a wide table that are read at once.
-COLUMNS_AT_ONCE = 256
-# Rows of a column that are read at once.
-_SLICE = 1 << 18
 
 
 def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:

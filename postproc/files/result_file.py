@@ -80,6 +80,12 @@ if TYPE_CHECKING:
 # The state to continue from is kept twice and written in turn: a run that is killed while it
 # writes one still has the other.
 _SLOTS = ("0", "1")
+# Steps of the run as it was begun: what is recorded follows from them.
+BEGUN_FOR = "n_steps_begun_for"
+# Attributes that a later end leaves: who wrote the rows that are there, how, and who chose effects.
+_KEPT = ("versions", "petsc_options", "effects_on", "effects_off")
+# Tables that it changes beside attributes and facts.
+CHANGED = ("line/evaluation_range",)
 
 
 class LineRows(NamedTuple):
@@ -404,14 +410,6 @@ def _create_growing(
     )
     set_attribute(dataset, "unit", channel.unit)
     set_attribute(dataset, "meaning", channel.meaning)
-
-
-# Steps of the run as it was begun: what is recorded follows from them.
-BEGUN_FOR = "n_steps_begun_for"
-# Attributes that a later end leaves: who wrote the rows that are there, how, and who chose effects.
-_KEPT = ("versions", "petsc_options", "effects_on", "effects_off")
-# Tables that it changes beside attributes and facts.
-CHANGED = ("line/evaluation_range",)
 
 
 def extend_run(path: Path, header: Header, n_steps: int) -> None:

@@ -67,6 +67,8 @@ _APART = 0.15
 _FACES = ("#c3c8ce", "#c3c8ce", "#ccd1d7", "#ccd1d7", "#eceef1", "#dde1e6")
 _STYLE = {"font.size": 15, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
           "grid.color": "#e3e5e8", "axes.axisbelow": True, "text.parse_math": False}  # fmt: skip
+# Points of a curve at most, far more than a picture has columns of; marks along the track at most.
+_MOST_POINTS, _MOST_MARKS = 4000, 12
 
 
 @contextlib.contextmanager
@@ -373,10 +375,6 @@ def _seen_parts(scenery: Scenery, view: View) -> list[LinePart]:
             rest = np.column_stack([one.rest[:, 0], across, one.rest[:, 2]])
             found[number] = replace(one, rest=rest)
     return found
-
-
-# Points of a curve at most, far more than a picture has columns of; marks along the track at most.
-_MOST_POINTS, _MOST_MARKS = 4000, 12
 
 
 class ForceChart:

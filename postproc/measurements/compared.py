@@ -21,6 +21,15 @@ from catenary.postproc.report.study_table import Column, StudyTable, file_table
 
 # Source of the tolerances that a description may replace.
 LINE_TEST = "comparison with a line test, EN 50318"
+PAGE, SUMMARY, FIGURES = "measurement.html", "measurement.json", "figures.csv"
+FORCES, UPLIFTS = "forces.csv", "uplifts.csv"
+_FORCE, _UPLIFT = "measured_force", "measured_uplift"
+NO_ERRORS = "No error is seen: the measurement is that of this run, but for noise."
+WHOSE = "An error is one of the measurement, of its description, or of the scene that was run."
+_SOURCES = (
+    f"Tolerances marked {UNCOMPARED} are from memory of the {LINE_TEST}, and were not compared "
+    "with its text."
+)
 
 
 @dataclass(frozen=True)
@@ -127,17 +136,6 @@ class Comparison:
         """Whether all judged figures are within their tolerances, None if none is judged."""
         judged = [one.passed for one in self.figures if one.passed is not None]
         return all(judged) if judged else None
-
-
-PAGE, SUMMARY, FIGURES = "measurement.html", "measurement.json", "figures.csv"
-FORCES, UPLIFTS = "forces.csv", "uplifts.csv"
-_FORCE, _UPLIFT = "measured_force", "measured_uplift"
-NO_ERRORS = "No error is seen: the measurement is that of this run, but for noise."
-WHOSE = "An error is one of the measurement, of its description, or of the scene that was run."
-_SOURCES = (
-    f"Tolerances marked {UNCOMPARED} are from memory of the {LINE_TEST}, and were not compared "
-    "with its text."
-)
 
 
 def figures_table(found: Comparison) -> StudyTable:

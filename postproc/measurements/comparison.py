@@ -51,6 +51,14 @@ _WIDENED = 6.0
 _NEAR_MAST = 1.0
 # A support is that of the run if it is this near [m].
 _NEAR_SUPPORT = 10.0
+# Errors below these are of no account, however certain: of places [m], of the force as a share of
+# its mean, of a filter as a share of the standard deviation.
+SHIFT, DRIFTED, FORCE_SHARE, _FILTER_SHARE = 0.2, 0.1, 0.003, 0.03
+# A constant of so many stated deviations is no error.
+BIASES = 3.0
+# Means and deviations of a measured force and of the run's differ by less than the first factor;
+# by the others where one is in N and the other in kN.
+_ALIKE, _UNITS = 3.0, (1e-3, 1e3)
 
 
 def compare_with(results: Results, passage: Passage) -> Comparison:
@@ -434,16 +442,6 @@ def _near_samples(position: np.ndarray, at: np.ndarray) -> np.ndarray:
     # The middle of a step belongs to one sample or the other, whatever the rounding.
     near = distance <= half * (1.0 + 1e-6)
     return np.asarray((position >= at[0]) & (position <= at[-1]) & near)
-
-
-# Errors below these are of no account, however certain: of places [m], of the force as a share of
-# its mean, of a filter as a share of the standard deviation.
-SHIFT, DRIFTED, FORCE_SHARE, _FILTER_SHARE = 0.2, 0.1, 0.003, 0.03
-# A constant of so many stated deviations is no error.
-BIASES = 3.0
-# Means and deviations of a measured force and of the run's differ by less than the first factor;
-# by the others where one is in N and the other in kN.
-_ALIKE, _UNITS = 3.0, (1e-3, 1e3)
 
 
 def errors_of(

@@ -44,6 +44,17 @@ _TEMPLATE = "view.py.template"
 # Line in the window beside one pantograph [m], width over height of the window, and the share of
 # the room above the contact wire that the arrow of a mean force fills.
 _WIDTH, _ASPECT, _ARROW = 110.0, 1280.0 / 480.0, 0.4
+_NUMBERS = "scenery.h5"
+_CELLS = {1: "Polyvertex", 2: "Polyline", 4: "Quadrilateral"}
+STATE = "view.pvsm"
+PROGRAM, _SCREEN = "pvpython", "xvfb-run"
+# Longest that ParaView may take [s].
+_PATIENCE = 300.0
+# Without -noreset a screen starts anew whenever nobody is connected to it, and refuses whoever
+# comes meanwhile: ParaView connects, leaves and connects again.
+SCREEN_OF_ITS_OWN = "-screen 0 1600x900x24 -noreset"
+# Two that begin at one time may take one screen, which the first to end takes from the other.
+_ATTEMPTS, _LOST = 3, "X server connection"
 
 
 def write_script(
@@ -146,10 +157,6 @@ def _settings(
         "speed": data.speed,
         "times": [float(times[0]), float(times[-1])],
     }  # fmt: skip
-
-
-_NUMBERS = "scenery.h5"
-_CELLS = {1: "Polyvertex", 2: "Polyline", 4: "Quadrilateral"}
 
 
 def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
@@ -258,17 +265,6 @@ def _text(name: str, grids: list[str]) -> str:
         whole = [begin, *whole, "</Grid>"]
     head = '<?xml version="1.0" encoding="UTF-8"?>\n<Xdmf Version="3.0">\n<Domain>'
     return "\n".join([head, *whole, "</Domain>\n</Xdmf>\n"])
-
-
-STATE = "view.pvsm"
-PROGRAM, _SCREEN = "pvpython", "xvfb-run"
-# Longest that ParaView may take [s].
-_PATIENCE = 300.0
-# Without -noreset a screen starts anew whenever nobody is connected to it, and refuses whoever
-# comes meanwhile: ParaView connects, leaves and connects again.
-SCREEN_OF_ITS_OWN = "-screen 0 1600x900x24 -noreset"
-# Two that begin at one time may take one screen, which the first to end takes from the other.
-_ATTEMPTS, _LOST = 3, "X server connection"
 
 
 def write_state(script: Path) -> tuple[Path | None, str]:

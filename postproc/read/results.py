@@ -33,6 +33,9 @@ from catenary.solver.time_loop.views import channels
 
 # Places along the line come from sums of span lengths, which round by far less [m].
 _ROUNDING = 1e-6
+# The tables of a result file, which is open and valid, or of a march that wrote none.
+ResultTables = ValidatedFile | MarchedFile
+logger = logging.getLogger("catenary.results")
 
 
 def in_stretch(x: np.ndarray, start: float, end: float) -> np.ndarray:
@@ -71,10 +74,6 @@ class ContactProfile(NamedTuple):
         """Places along the track and values at the nodes, with a gap between pieces."""
         x = np.insert(self.x, self.breaks, self.x[self.breaks])
         return x, np.insert(values, self.breaks, np.nan)
-
-
-# The tables of a result file, which is open and valid, or of a march that wrote none.
-ResultTables = ValidatedFile | MarchedFile
 
 
 class LineOfRun:
@@ -256,9 +255,6 @@ class TrainOfRun(LineOfRun):
     def first_position(self) -> np.ndarray:
         """Places of the pantographs in the first record, (n_pantographs,) [m]."""
         return np.asarray(self._file["channels/contact_position"][0])
-
-
-logger = logging.getLogger("catenary.results")
 
 
 class Results(TrainOfRun):

@@ -28,6 +28,26 @@ if TYPE_CHECKING:
     from jinja2 import Template
     from matplotlib.figure import Figure
 
+_TEMPLATES = Path(__file__).parent / "templates"
+# A figure with its unit, which stay on one line.
+_FIGURE = re.compile(r"(?<=\d) (%|(?:N|kN|mm|m|km|kg|Hz|s|J)(?:/[A-Za-z]{1,2})?)(?![\w/])")
+# A unit behind its figure, or in brackets.
+_UNIT = re.compile(r"(?<=\xa0)\w+/\w+|\[\w+/\w+\]")
+# Cells of tables that are coloured.
+_MARKS = {
+    "passed": "yes", "failed": "no", "yes": "yes", "no": "no", "?": "unknown",
+    "reproduced": "yes", "not reproduced": "no", "cannot be decided": "unknown",
+}  # fmt: skip
+# A figure is printed this much smaller at most, where it then fits the rest of a sheet [-].
+_SMALLEST = 0.8
+# Height of a sheet between the margins that the style of the page has, less what rows and headings
+# leave that move to the next sheet; height of a caption, which keeps its size [px of CSS].
+_SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 9.0) * 96.0 / 25.4, 28.0
+# A sheet on which all of a report has room: it tells how high everything is.
+_ENDLESS = "@page { size: 210mm 100000mm !important; }"
+# A heading so close above a figure goes with it to the next sheet [px of CSS].
+_CLOSE = 60.0
+
 
 @dataclass(frozen=True)
 class EvaluatedRun:
@@ -144,18 +164,6 @@ def number(value: Any, digits: int = 1) -> str:
     return "–" if value is None or value != value else fixed(value, digits)
 
 
-_TEMPLATES = Path(__file__).parent / "templates"
-# A figure with its unit, which stay on one line.
-_FIGURE = re.compile(r"(?<=\d) (%|(?:N|kN|mm|m|km|kg|Hz|s|J)(?:/[A-Za-z]{1,2})?)(?![\w/])")
-# A unit behind its figure, or in brackets.
-_UNIT = re.compile(r"(?<=\xa0)\w+/\w+|\[\w+/\w+\]")
-# Cells of tables that are coloured.
-_MARKS = {
-    "passed": "yes", "failed": "no", "yes": "yes", "no": "no", "?": "unknown",
-    "reproduced": "yes", "not reproduced": "no", "cannot be decided": "unknown",
-}  # fmt: skip
-
-
 def page(
     title: str,
     lead: str,
@@ -236,17 +244,6 @@ def _with_whole_unit(head: str) -> Any:
 def _data_uri(data: bytes) -> str:
     kind = "png" if data.startswith(b"\x89PNG") else "svg+xml"
     return f"data:image/{kind};base64," + base64.b64encode(data).decode("ascii")
-
-
-# A figure is printed this much smaller at most, where it then fits the rest of a sheet [-].
-_SMALLEST = 0.8
-# Height of a sheet between the margins that the style of the page has, less what rows and headings
-# leave that move to the next sheet; height of a caption, which keeps its size [px of CSS].
-_SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 9.0) * 96.0 / 25.4, 28.0
-# A sheet on which all of a report has room: it tells how high everything is.
-_ENDLESS = "@page { size: 210mm 100000mm !important; }"
-# A heading so close above a figure goes with it to the next sheet [px of CSS].
-_CLOSE = 60.0
 
 
 def pdf(html: str) -> bytes:

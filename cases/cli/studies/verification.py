@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from catenary.cases.studies.sweep.jobs import Job
 
 _MOST_REPEATS = 99
+TABLES = ("hard.csv", "hard.md")
+MAP, MAP_PICTURE = "stability_map.csv", "stability_map.png"
 
 
 @verb(
@@ -106,9 +108,6 @@ def accuracy(
     time_of_all = f"{counted(len(ended), 'run')}, {found.wall:.0f} s"
     print_findings(f"{output.as_text(found, wanted)}\n\n{time_of_all}", files)
     return console.DONE
-
-
-TABLES = ("hard.csv", "hard.md")
 
 
 @verb(
@@ -188,9 +187,6 @@ def hard(
         f"{len(found) - len(failed)} of {len(found)} limits kept"
     )
     return console.NOT_ACCEPTED if failed else console.DONE
-
-
-MAP, MAP_PICTURE = "stability_map.csv", "stability_map.png"
 
 
 @serial_verb(

@@ -39,6 +39,12 @@ from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
+# Force under which a line is held before it is let go [N].
+PULL = 200.0
+# Steps whose states are kept until the work done in them is summed.
+_BLOCK = 100
+_MOTION = ("displacement", "velocity", "acceleration")
+
 
 class LineBalance:
     """Newmark's energy balance of the line, and what one switch of a dropper adds to it.
@@ -183,13 +189,6 @@ def _stretch(direction: Direction, values: np.ndarray) -> np.ndarray:
     """Stretch of n links under values (k, n_dofs), (k, n)."""
     unknowns, weights = direction
     return np.asarray((values[:, unknowns] * weights).sum(axis=2))
-
-
-# Force under which a line is held before it is let go [N].
-PULL = 200.0
-# Steps whose states are kept until the work done in them is summed.
-_BLOCK = 100
-_MOTION = ("displacement", "velocity", "acceleration")
 
 
 @dataclass

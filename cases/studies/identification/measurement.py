@@ -31,6 +31,20 @@ from catenary.cases.studies.measured import (
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.filters import power_kept
 
+# The slowest pole decays with sin(pi/12) 2 pi fc, so that 1e-8 is left after so many periods.
+_REMEMBERED = 12.0
+FORCE, HEIGHT = "force", "head height"
+UNITS = {FORCE: "N", HEIGHT: "m"}
+_MOST_SAMPLES = 8000  # their covariance takes half a gigabyte
+# Raw samples that half a period of the filter takes at least. Of fewer all would be kept, and the
+# filter leaves nothing at half of their rate: the covariance of their noise is singular.
+_RAW = 2.0
+# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
+_SETTLED = 6.0
+# Of what is faster than so many cut-offs the filter leaves 0.8 %, of the noise's deviation 0.2 %;
+# values with more than these parts, of their deviation and of the noise's, have not passed it.
+_FAST, _OF_VALUES, _OF_NOISE = 1.5, 0.01, 0.1
+
 
 class Sought(Table):
     """A parameter that is looked for.
@@ -92,10 +106,6 @@ class Task(Table):
         return self
 
 
-# The slowest pole decays with sin(pi/12) 2 pi fc, so that 1e-8 is left after so many periods.
-_REMEMBERED = 12.0
-
-
 def correlation(lags: np.ndarray, cut_off: float, dt: float | None = None) -> np.ndarray:
     """Correlation (n,) of white noise that passed the filter of `filters.low_pass`.
 
@@ -135,19 +145,6 @@ class Whitening:
     def of(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) or (n, m), divided by the square root of their covariance."""
         return np.asarray(linalg.solve_triangular(self._factor, values, lower=True))
-
-
-FORCE, HEIGHT = "force", "head height"
-UNITS = {FORCE: "N", HEIGHT: "m"}
-_MOST_SAMPLES = 8000  # their covariance takes half a gigabyte
-# Raw samples that half a period of the filter takes at least. Of fewer all would be kept, and the
-# filter leaves nothing at half of their rate: the covariance of their noise is singular.
-_RAW = 2.0
-# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
-_SETTLED = 6.0
-# Of what is faster than so many cut-offs the filter leaves 0.8 %, of the noise's deviation 0.2 %;
-# values with more than these parts, of their deviation and of the noise's, have not passed it.
-_FAST, _OF_VALUES, _OF_NOISE = 1.5, 0.01, 0.1
 
 
 @dataclass(frozen=True)

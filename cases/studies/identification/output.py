@@ -24,6 +24,11 @@ from catenary.postproc.report.study_table import Column, Content, StudyTable, fi
 _MANY = 400
 # Entries of the panel of parameters that leave letters legible.
 _MOST = 60
+PARAMETERS, CORRELATION = "parameters.csv", "correlation.csv"
+DIRECTIONS, RESIDUALS, SUMMARY = "directions.csv", "residuals.csv", "identification.json"
+PASSAGE, PRIORS = "passage.png", "parameters.png"
+_MOST_DIRECTIONS, _MOST_PAIRS, _MOST_PARTS = 5, 5, 4
+_CORRELATED, _LEAST_PART = 0.5, 0.2
 
 
 @figures.own_style()
@@ -77,13 +82,6 @@ def draw_parameters(found: Identification) -> Figure:
     axes.set_ylim(len(shown) - 0.5, -0.5)
     figures.legend_above(axes)
     return figure
-
-
-PARAMETERS, CORRELATION = "parameters.csv", "correlation.csv"
-DIRECTIONS, RESIDUALS, SUMMARY = "directions.csv", "residuals.csv", "identification.json"
-PASSAGE, PRIORS = "passage.png", "parameters.png"
-_MOST_DIRECTIONS, _MOST_PAIRS, _MOST_PARTS = 5, 5, 4
-_CORRELATED, _LEAST_PART = 0.5, 0.2
 
 
 def parameters_table(found: Identification) -> StudyTable:

@@ -49,6 +49,17 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
 from catenary.solver.tangents.set_up import Change, SetUp, set_up_of
 
+# The search ends when a step makes the sum of squares, which is near the number n of samples, less
+# by less than this part. What is left of the sum is the squared distance to the best parameters in
+# posterior deviations: some 0.01 of n = 100.
+_TOLERANCE = 1e-4
+_MOST_MARCHES = 60  # of a search
+_SEED = 0  # of the draws from which further searches start
+# Means of a signal and of its march differ by such a factor only if columns or units, whose factors
+# are 10 to 1000, are not as stated, or by a zero of so many deviations of its bias.
+_OTHER_UNIT, _LARGE_BIAS = 8.0, 5.0
+_SEARCHES_IN_DOUBT = 3  # where the task names no number and the first leaves an unlikely residual
+
 
 class FittedMarch:
     """Marches of a scene whose parameters are changed. Not collective: one process.
@@ -158,18 +169,6 @@ class FittedMarch:
                     self._kept[key] = change
             changes.append(change)
         return changes
-
-
-# The search ends when a step makes the sum of squares, which is near the number n of samples, less
-# by less than this part. What is left of the sum is the squared distance to the best parameters in
-# posterior deviations: some 0.01 of n = 100.
-_TOLERANCE = 1e-4
-_MOST_MARCHES = 60  # of a search
-_SEED = 0  # of the draws from which further searches start
-# Means of a signal and of its march differ by such a factor only if columns or units, whose factors
-# are 10 to 1000, are not as stated, or by a zero of so many deviations of its bias.
-_OTHER_UNIT, _LARGE_BIAS = 8.0, 5.0
-_SEARCHES_IN_DOUBT = 3  # where the task names no number and the first leaves an unlikely residual
 
 
 class Unknown(NamedTuple):

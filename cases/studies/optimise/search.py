@@ -41,6 +41,23 @@ _COLUMNS = (
     Column("length_mm", "length [mm]", ".1f"),
     Column("change_mm", "change [mm]", "+.1f"),
 )
+# A violation of a constraint smaller than this share of its scale is round-off of a search.
+SLACK = 1e-6
+# Scale of forces of droppers at rest [N].
+_FORCE_AT_REST = 100.0
+# Steps of slopes of forces at rest, over those of runs: without sudden slackening anywhere.
+_OF_STEP = 0.05
+# Least margin of such forces from which changes are scaled, in their scale.
+_LEAST_REST = 0.05
+# Of the shipped value: the objective of a point whose runs broke, which a search leaves again.
+_OF_BROKEN = 10.0
+# Greatest first standard deviation of the evolution strategy, over the width of the bounds.
+_FIRST_SPREAD = 0.15
+_MOST_ITERATIONS = 200
+# Iterations of SLSQP that must gain something together.
+_FRUITLESS = 3
+# Objective of points that violate constraints: they rank behind all that do not.
+_BEHIND = 1e3
 
 
 def dropper_table(shipped: Scene, optimum: Scene) -> StudyTable:
@@ -105,18 +122,6 @@ def least_forces(scene: Scene) -> np.ndarray:
     found = np.full(int(number.max(initial=-1)) + 1, np.inf)
     np.minimum.at(found, number, form.dropper_force[order])
     return found
-
-
-# A violation of a constraint smaller than this share of its scale is round-off of a search.
-SLACK = 1e-6
-# Scale of forces of droppers at rest [N].
-_FORCE_AT_REST = 100.0
-# Steps of slopes of forces at rest, over those of runs: without sudden slackening anywhere.
-_OF_STEP = 0.05
-# Least margin of such forces from which changes are scaled, in their scale.
-_LEAST_REST = 0.05
-# Of the shipped value: the objective of a point whose runs broke, which a search leaves again.
-_OF_BROKEN = 10.0
 
 
 class Spent(Exception):
@@ -388,15 +393,6 @@ def _moved(change: np.ndarray, i: int, by: float) -> np.ndarray:
     found = change.copy()
     found[i] += by
     return found
-
-
-# Greatest first standard deviation of the evolution strategy, over the width of the bounds.
-_FIRST_SPREAD = 0.15
-_MOST_ITERATIONS = 200
-# Iterations of SLSQP that must gain something together.
-_FRUITLESS = 3
-# Objective of points that violate constraints: they rank behind all that do not.
-_BEHIND = 1e3
 
 
 def search(problem: Problem, method: str, table: SearchTable) -> Point:

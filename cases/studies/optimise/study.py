@@ -41,6 +41,8 @@ AS_IS, FINER_MESH, SHORTER_STEP, UNSEEN = "as it is", "mesh x 2", "step / 2", "u
 COMPARED = {"std_N": 1.0, "max_N": 1.0, "min_N": -1.0, "loss_percent": 1.0, "max_uplift_mm": 1.0}
 # Changes below this share, or this much of a percentage, are no change.
 _SAME = 0.005
+# Shares of an optimum's changes that are tried in whole units.
+_SHARES = (1.0, 0.97, 0.94, 0.9, 0.8)
 
 
 class Row(NamedTuple):
@@ -215,10 +217,6 @@ def unseen_direction(rows: Sequence[Row]) -> str:
         f"it was searched in the direction {seen[0].direction} alone: std_N changes there by "
         f"{100 * here:+.1f} % at most, and in the other direction by {100 * there:+.1f} %"
     )
-
-
-# Shares of an optimum's changes that are tried in whole units.
-_SHARES = (1.0, 0.97, 0.94, 0.9, 0.8)
 
 
 @dataclass(frozen=True)

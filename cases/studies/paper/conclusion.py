@@ -44,6 +44,11 @@ from catenary.postproc.report.study_table import Column, StudyTable, texts_table
 from catenary.solver.statics.form_finding import find_form
 
 Words = dict[str, str]
+# Result folders by damping and train, and figures of the same runs, to pictures.
+Draw = Callable[[Mapping[str, Mapping[str, Path]], Rows], list[StudyFigure]]
+_NAMED = 4  # variations that a reason names
+_BY_READING = ("mean_N", "std_N", "std_percent", "max_N", "min_N", "loss_percent", "uplift_mm",
+               "slack_before", "slack_after")  # fmt: skip
 
 
 class Condition(Table):
@@ -223,13 +228,6 @@ def _judged(condition: Condition, rows: Rows) -> _Found:
     return _Found(
         all(kept), text + (", within the discretisation's error" if is_open else ""), is_open
     )
-
-
-# Result folders by damping and train, and figures of the same runs, to pictures.
-Draw = Callable[[Mapping[str, Mapping[str, Path]], Rows], list[StudyFigure]]
-_NAMED = 4  # variations that a reason names
-_BY_READING = ("mean_N", "std_N", "std_percent", "max_N", "min_N", "loss_percent", "uplift_mm",
-               "slack_before", "slack_after")  # fmt: skip
 
 
 class Ranked(NamedTuple):

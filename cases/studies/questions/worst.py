@@ -32,6 +32,21 @@ from catenary.solver.wind import drag_width, gust_points, upward_pressure
 _DEVIATIONS, _SHARE, _NORMAL = 3.0, 0.1, 1.4826
 # Likes of a dropper hang so close to the same share of their spans [-]; fewer than this say little.
 _SAME_SHARE, _FEWEST = 0.02, 3
+# Frequencies so close are near each other, lengths so far apart differ [-].
+_NEAR, _LONGER = 0.1, 0.05
+# A reflection that keeps less of its amplitude is no candidate [-].
+_FELT = 0.01
+# Elasticity beyond that of other spans [-], height beyond them [m] and rest force of droppers
+# beyond their likes and gusts stronger than on other spans [-] from which on these are candidates.
+_SOFTER, _HIGHER, _HEAVIER, _GUSTIER = 0.1, 5e-3, 0.5, 0.1
+# Lift under a unit force below which a contact wire is held [m/N].
+_ANCHORED = 1e-9
+_POINTS = 101  # at which profiles of spans are compared
+# Gusts so long before a pantograph comes still move the span, a period of its own motion [s].
+_BEFORE = 1.0
+_FEWEST_LIKES = 3
+NONE = "no cause found"
+_MOST_CAUSES = 4  # of a place in the text; tables have all
 
 
 class Passage(NamedTuple):
@@ -226,21 +241,6 @@ def _spots(
         for n, is_out in zip(own.tolist(), stands_out(values[own]), strict=True):
             spots.append(Spot(n, float(x[n]), wires[n], float(values[n]), median, is_out))
     return sorted(spots, key=lambda one: -one.value)
-
-
-# Frequencies so close are near each other, lengths so far apart differ [-].
-_NEAR, _LONGER = 0.1, 0.05
-# A reflection that keeps less of its amplitude is no candidate [-].
-_FELT = 0.01
-# Elasticity beyond that of other spans [-], height beyond them [m] and rest force of droppers
-# beyond their likes and gusts stronger than on other spans [-] from which on these are candidates.
-_SOFTER, _HIGHER, _HEAVIER, _GUSTIER = 0.1, 5e-3, 0.5, 0.1
-# Lift under a unit force below which a contact wire is held [m/N].
-_ANCHORED = 1e-9
-_POINTS = 101  # at which profiles of spans are compared
-# Gusts so long before a pantograph comes still move the span, a period of its own motion [s].
-_BEFORE = 1.0
-_FEWEST_LIKES = 3
 
 
 def elasticity_along(rest: LineAtRest, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
@@ -533,10 +533,6 @@ class Causes:
         for one, force in zip(self._passages, gust_forces(self._rest, when), strict=False):
             found.setdefault(one.pantograph, {})[one.span] = force
         return found
-
-
-NONE = "no cause found"
-_MOST_CAUSES = 4  # of a place in the text; tables have all
 
 
 def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:

@@ -56,6 +56,7 @@ _FROM_STATISTICS = {
     "stat_max_N": "stat_max", "stat_min_N": "stat_min", "max_N": "maximum", "min_N": "minimum",
     "loss_percent": "loss_percent",
 }  # fmt: skip
+PASSED, FAILED, NOT_JUDGED = "passed", "failed", "not judged"
 
 
 @dataclass
@@ -280,7 +281,6 @@ def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:
         )
 
 
-PASSED, FAILED, NOT_JUDGED = "passed", "failed", "not judged"
 COLUMNS = (
     Column("configuration", "configuration"),
     Column("of", "of"),

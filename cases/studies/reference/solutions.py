@@ -40,6 +40,30 @@ from catenary.postproc.report.study_table import Column, Content
 ONE, TWO = "one", "two"
 # Nothing but channels of the train is recorded; extremes of the line are kept of every step.
 RECORDED = ("output.field_every_s=0", "output.energy_every_s=0", "output.line_channels=[]")
+# Levels as places in a configuration's lists of steps and meshes, and the chains of three that have
+# one of the two alike.
+FINEST = (0, 0)
+STEP_CHAIN, MESH_CHAIN = (FINEST, (1, 0), (2, 0)), (FINEST, (0, 1), (0, 2))
+_LEVELS = (*STEP_CHAIN, *MESH_CHAIN[1:])
+LINE, UPLIFT, HISTORY = "line", "max_uplift_mm", "force_history_N"
+# Figures of a solution: of each pantograph, and of the line.
+OF_FORCE = tuple(column for column in OF_PANTOGRAPH if column.name != "arcing_percent")
+OF_LINE = (
+    STATISTICS[UPLIFT],
+    Column("elasticity_max_mm_per_N", meaning="largest elasticity in a span [mm/N]"),
+    Column("elasticity_min_mm_per_N", meaning="smallest elasticity in a span [mm/N]"),
+)
+QUANTITIES = {
+    column.name: column
+    for column in (
+        *OF_FORCE,
+        *OF_LINE,
+        Column(HISTORY, meaning="rms difference of the force, 0-20 Hz [N]"),
+    )
+}
+DATA = Path(__file__).parent / "data"
+STATISTICS_FILE, METADATA_FILE = "statistics.csv", "metadata.json"
+PLACE = "place_m"
 
 
 @dataclass(frozen=True)
@@ -125,29 +149,6 @@ def _every() -> Iterator[Configuration]:
                     tuple(mesh["elements_per_gap"]),
                     float(mesh["grading"]),
                 )
-
-
-# Levels as places in a configuration's lists of steps and meshes, and the chains of three that have
-# one of the two alike.
-FINEST = (0, 0)
-STEP_CHAIN, MESH_CHAIN = (FINEST, (1, 0), (2, 0)), (FINEST, (0, 1), (0, 2))
-_LEVELS = (*STEP_CHAIN, *MESH_CHAIN[1:])
-LINE, UPLIFT, HISTORY = "line", "max_uplift_mm", "force_history_N"
-# Figures of a solution: of each pantograph, and of the line.
-OF_FORCE = tuple(column for column in OF_PANTOGRAPH if column.name != "arcing_percent")
-OF_LINE = (
-    STATISTICS[UPLIFT],
-    Column("elasticity_max_mm_per_N", meaning="largest elasticity in a span [mm/N]"),
-    Column("elasticity_min_mm_per_N", meaning="smallest elasticity in a span [mm/N]"),
-)
-QUANTITIES = {
-    column.name: column
-    for column in (
-        *OF_FORCE,
-        *OF_LINE,
-        Column(HISTORY, meaning="rms difference of the force, 0-20 Hz [N]"),
-    )
-}
 
 
 def jobs_of(chosen: Sequence[Configuration]) -> list[Job]:
@@ -259,11 +260,6 @@ def _row(
     }
     rounded = {name: None if number is None else round(number, 6) for name, number in found.items()}
     return {"configuration": one.name, "of": place, "quantity": quantity, **rounded}
-
-
-DATA = Path(__file__).parent / "data"
-STATISTICS_FILE, METADATA_FILE = "statistics.csv", "metadata.json"
-PLACE = "place_m"
 
 
 def files_of(chosen: Sequence[Configuration], ended: Sequence[Ended]) -> dict[str, Content]:

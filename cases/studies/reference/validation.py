@@ -58,6 +58,11 @@ _OF_RANGES = {
     "support_uplift": UPLIFT,
 }
 _ELASTICITY = ("elasticity_max_mm_per_N", "elasticity_min_mm_per_N")
+JUDGED, VALIDATION = "judged", "validation"
+_BORROWED = (
+    "The bands of EN 50318:2018 for its reference models are not publicly known: figures are "
+    "judged by what the standard allows between a simulation and a line test."
+)
 
 
 @dataclass(frozen=True)
@@ -210,13 +215,6 @@ def _reference(case: str, name: str) -> list[dict[str, str]]:
     path = find_case(case).parent / "reference" / name
     lines = path.read_text(encoding="utf-8").splitlines()
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
-
-
-JUDGED, VALIDATION = "judged", "validation"
-_BORROWED = (
-    "The bands of EN 50318:2018 for its reference models are not publicly known: figures are "
-    "judged by what the standard allows between a simulation and a line test."
-)
 
 
 def rows_of(others: Sequence[Others]) -> list[dict[str, Any]]:

@@ -44,6 +44,10 @@ from catenary.meshgen.line import Line
 
 # No coordinate is nearer to 0 or 1: a normal quantity stays within 7 standard deviations.
 _EDGE = 1e-12
+# Correlated values of more places take minutes to make; so many numbers take about 1 GB as text.
+_MOST_CORRELATED, _MOST_NUMBERS = 5_000, 50_000_000
+# Samples whose fields are made at a time.
+_BATCH = 1000
 
 
 def points(sampling: SamplingTable) -> np.ndarray:
@@ -129,11 +133,6 @@ def normal_rows(seed: int, name: str, realisations: Sequence[int], n: int) -> np
         generator.standard_normal(out=row)
     return rows
 
-
-# Correlated values of more places take minutes to make; so many numbers take about 1 GB as text.
-_MOST_CORRELATED, _MOST_NUMBERS = 5_000, 50_000_000
-# Samples whose fields are made at a time.
-_BATCH = 1000
 
 # Keys that place droppers, supports and spans.
 _GEOMETRY = (

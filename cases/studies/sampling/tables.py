@@ -29,6 +29,9 @@ _Positive = Annotated[float, Field(gt=0, le=1e15)]
 N_SEEDS = 2**31 - 1
 _FARTHEST = 8.0  # standard deviations, beyond which is less than 1e-15 of a normal quantity
 _WIDEST = 100.0  # standard deviations of lognormal quantities over their means
+MOST_SAMPLES = 100_000
+_Key = Annotated[str, Field(min_length=1, max_length=200)]
+SALTELLI = "saltelli"
 
 
 class NormalTable(Table):
@@ -214,11 +217,6 @@ def chosen(table: ChoicesTable, probabilities: np.ndarray) -> list[int]:
 def seeds(probabilities: np.ndarray) -> list[int]:
     """A whole number below ``N_SEEDS`` for each probability in (0, 1)."""
     return [int(number) for number in probabilities * N_SEEDS]
-
-
-MOST_SAMPLES = 100_000
-_Key = Annotated[str, Field(min_length=1, max_length=200)]
-SALTELLI = "saltelli"
 
 
 class _AlongLine(Table):

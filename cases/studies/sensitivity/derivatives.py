@@ -36,6 +36,21 @@ from catenary.solver.tangents.set_up import (
 
 # Memory for derivatives of all steps; for further parameters the march is made again [B].
 _BYTES = 2**28
+_MM = 1e3
+# Half of the last digit of the last column, which has one more than others.
+_SEEN = 0.5e-4
+_BY_PERCENT = "std_change_by_percent_N"
+_FORCES = {
+    "mean_change_N": ("mean", "mean [N]"),
+    "std_change_N": ("std", "sigma [N]"),
+    "stat_max_change_N": ("stat_max", ""),
+    "stat_min_change_N": ("stat_min", "stat. min [N]"),
+    "max_change_N": ("maximum", ""),
+    "min_change_N": ("minimum", "least [N]"),
+}
+_MM_IN_M = 1e3
+# Half of the last digit of a height's change [mm]: a smaller one is round-off, which has no place.
+_SEEN_HEIGHT_MM = 0.5e-3
 
 
 @dataclass
@@ -228,20 +243,6 @@ def _add(
         found.by_uplift.append(float(by_uplift[place]))
 
 
-_MM = 1e3
-# Half of the last digit of the last column, which has one more than others.
-_SEEN = 0.5e-4
-_BY_PERCENT = "std_change_by_percent_N"
-_FORCES = {
-    "mean_change_N": ("mean", "mean [N]"),
-    "std_change_N": ("std", "sigma [N]"),
-    "stat_max_change_N": ("stat_max", ""),
-    "stat_min_change_N": ("stat_min", "stat. min [N]"),
-    "max_change_N": ("maximum", ""),
-    "min_change_N": ("minimum", "least [N]"),
-}
-
-
 def table_of(found: Sensitivity) -> StudyTable:
     """A row for each parameter and pantograph; first what changes the standard deviation most.
 
@@ -347,11 +348,6 @@ def _early(found: Sensitivity) -> list[str]:
             "(`catenary sweep`)."
         )
     return sentences
-
-
-_MM_IN_M = 1e3
-# Half of the last digit of a height's change [mm]: a smaller one is round-off, which has no place.
-_SEEN_HEIGHT_MM = 0.5e-3
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,13 @@ from catenary.postproc.report.study_table import (
 
 HISTOGRAM_TABLE, HISTOGRAM_PICTURE = "force_histogram.csv", "force_histogram.png"
 _LOW, _HIGH = 0.05, 0.95
+TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
+PARQUET = "sweep.parquet"
+# Columns of what variants differ by and is no key: their names in a file, the train's direction.
+NAMED, DIRECTION = "named", "direction"
+PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")
+_MOST_LABELS = 10  # curves that a legend can name
+_LONGEST = 48  # a longer meaning of a key explains more than an axis has room for
 
 
 def force_histograms(ended: Sequence[Ended]) -> pd.DataFrame | None:
@@ -91,15 +98,6 @@ def draw_histograms(found: pd.DataFrame) -> Figure:
     axes.set_title("line: mean of all variants, band: 5 to 95 % of them", loc="left")
     figures.legend_above(axes)
     return figure
-
-
-TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
-PARQUET = "sweep.parquet"
-# Columns of what variants differ by and is no key: their names in a file, the train's direction.
-NAMED, DIRECTION = "named", "direction"
-PLOTTED = ("mean_N", "std_N", "max_N", "min_N", "max_uplift_mm")
-_MOST_LABELS = 10  # curves that a legend can name
-_LONGEST = 48  # a longer meaning of a key explains more than an axis has room for
 
 
 def table_of(ended: Sequence[Ended]) -> StudyTable:

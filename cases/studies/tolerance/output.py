@@ -29,6 +29,8 @@ _BESIDE, _SPREAD = 0.008, 0.018
 # Marks of a curve of shares with their sizes, and what the legend says of them.
 _RING, _TRIANGLE = ("o", 9.0), ("v", 5.0)
 _MARKS = {_RING: "tolerance", _TRIANGLE: "at most, the rest unknown"}
+TABLE, RECORD, PAGE = "tolerance.csv", "tolerance.json", "tolerance.md"
+SHARES, VALUES = "tolerance_shares.png", "tolerance_values.png"
 
 
 def _criteria(found: Sequence[Tolerance], most: int) -> list[str]:
@@ -175,10 +177,6 @@ def _draw_value(axes: Axes, one: Tolerance) -> None:
     axes.axvline(one.level, color=figures.colour(2), lw=1.2, zorder=1, label="tolerance")
     figures.tidy(axes, _axis(one), "")
     axes.set_ylabel(figures.wrapped(bound.meaning), fontsize="small")
-
-
-TABLE, RECORD, PAGE = "tolerance.csv", "tolerance.json", "tolerance.md"
-SHARES, VALUES = "tolerance_shares.png", "tolerance_values.png"
 
 
 def files_of(plan: Plan, found: Sequence[Tolerance]) -> dict[str, Content]:

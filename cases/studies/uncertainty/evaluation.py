@@ -27,6 +27,20 @@ _RESAMPLES = 2000
 # Of fewer values there are too few different resamples, and no kurtosis; of more resamples need n^2
 # numbers.
 _FEWEST, _MOST_RESAMPLED = 10, 1000
+SOBOL = "Sobol indices (Saltelli et al. 2010; Jansen's total-order index)"
+GIVEN_DATA = (
+    "first-order indices from given data (RBD-FAST with the correction of Tissot and Prieur)"
+)
+_SEED = 1  # of resamples
+# Fewer runs leave no harmonics to tell from noise, in half of which bounds are estimated.
+_FEWEST_RUNS, _MANY = 100, 500
+_HARMONICS = 4, 10
+# Resamples for bounds, of up to _MOST runs and of more: those have small bounds, at a greater cost.
+_RESAMPLES_OF_INDICES, _MOST = (100, 25), 5000
+# Half width beyond which a bound of an index, a number from 0 to 1, is none.
+_WIDEST = 10.0
+ANY_CRITERION = "any of them"
+Row = dict[str, Any]
 
 
 class Bounded(NamedTuple):
@@ -141,20 +155,6 @@ def share(hits: int, n: int) -> Bounded:
 def named(name: str, one: Bounded) -> dict[str, Any]:
     """An estimate as three cells of a row."""
     return {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high}
-
-
-SOBOL = "Sobol indices (Saltelli et al. 2010; Jansen's total-order index)"
-GIVEN_DATA = (
-    "first-order indices from given data (RBD-FAST with the correction of Tissot and Prieur)"
-)
-_SEED = 1  # of resamples
-# Fewer runs leave no harmonics to tell from noise, in half of which bounds are estimated.
-_FEWEST_RUNS, _MANY = 100, 500
-_HARMONICS = 4, 10
-# Resamples for bounds, of up to _MOST runs and of more: those have small bounds, at a greater cost.
-_RESAMPLES_OF_INDICES, _MOST = (100, 25), 5000
-# Half width beyond which a bound of an index, a number from 0 to 1, is none.
-_WIDEST = 10.0
 
 
 def indices(table: RunTable) -> tuple[str, list[dict[str, Any]], list[str]]:
@@ -297,10 +297,6 @@ def _rbd_fast(keys: Sequence[str], x: np.ndarray, y: np.ndarray) -> Mapping[str,
     finally:
         np.random.set_state(before)
     return found
-
-
-ANY_CRITERION = "any of them"
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)

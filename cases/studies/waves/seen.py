@@ -26,6 +26,24 @@ from catenary.solver.waves.excitation import Excitation, MovingForce
 
 # Distance of points along the wire between which the motion is interpolated [m].
 _STEP = 0.5
+# Length of the stretches of line that energy is summed over [m].
+STRETCH = 2.0
+# Displacements of a node along x, y and z, and slopes of the latter two.
+_ALONG_AXES, _SLOPES = ("u", "v", "w"), ("", "theta_z", "theta_y")
+# Length beside an end of a window in which a spline still swings after the step there [m].
+_FROM_END = 4.0
+# A band is so many widths to both sides, and lies within a branch [-]; its largest width [Hz].
+_WIDTHS, _WIDEST = 4.0, 0.2
+# Narrower bands last too long [Hz]; a record has so many deviations of a signal in time behind its
+# centre [-].
+_NARROWEST, _LATE = 0.03, 1.3
+# Share of a record, at its end, over which a signal is let fade before its spectrum is taken.
+_FADED = 0.25
+# The fastest waves up to these frequencies are measured [Hz].
+_UP_TO = (0.5 * HIGHEST, HIGHEST)
+# Spans from the blow to the first station, least spans from there to the second, and which share of
+# the line between blow and end lies before the second.
+_FIRST, _APART, _SHARE = 2, 3, 0.5
 
 
 @dataclass(frozen=True)
@@ -166,14 +184,6 @@ def course_of(excitation: Excitation) -> tuple[Callable[[np.ndarray], np.ndarray
     if isinstance(excitation, MovingForce):
         return lambda times: excitation.place(times)[:, None], np.nan
     return lambda times: np.zeros((times.size, 0)), excitation.at
-
-
-# Length of the stretches of line that energy is summed over [m].
-STRETCH = 2.0
-# Displacements of a node along x, y and z, and slopes of the latter two.
-_ALONG_AXES, _SLOPES = ("u", "v", "w"), ("", "theta_z", "theta_y")
-# Length beside an end of a window in which a spline still swings after the step there [m].
-_FROM_END = 4.0
 
 
 @dataclass(frozen=True)
@@ -338,20 +348,6 @@ def _pieces(mesh: LineMesh) -> list[np.ndarray]:
         for name, nodes in mesh.wires.items()
         for part in np.split(nodes, mesh.breaks.get(name, none))
     ]
-
-
-# A band is so many widths to both sides, and lies within a branch [-]; its largest width [Hz].
-_WIDTHS, _WIDEST = 4.0, 0.2
-# Narrower bands last too long [Hz]; a record has so many deviations of a signal in time behind its
-# centre [-].
-_NARROWEST, _LATE = 0.03, 1.3
-# Share of a record, at its end, over which a signal is let fade before its spectrum is taken.
-_FADED = 0.25
-# The fastest waves up to these frequencies are measured [Hz].
-_UP_TO = (0.5 * HIGHEST, HIGHEST)
-# Spans from the blow to the first station, least spans from there to the second, and which share of
-# the line between blow and end lies before the second.
-_FIRST, _APART, _SHARE = 2, 3, 0.5
 
 
 class Arrived(NamedTuple):

@@ -86,6 +86,14 @@ _KINDS = {
     "duration": (PULSE, HAMMER),
     "impulse": (HAMMER,),
 }
+Row = dict[str, Any]
+TABLE, OBSTACLES = "waves.csv", "obstacles.csv"
+# Snapshots that show waves up to 20 Hz, and five of them a period at 20 Hz [s].
+SNAPSHOT_EVERY = 0.01
+# Of a blow, whose waves are shorter [s].
+BLOW_EVERY = 0.004
+# Length of line that is shown behind and ahead of the train [m].
+_BEHIND, _AHEAD = 300.0, 200.0
 
 
 def excitation_of(kind: str, settings: Excited, problem: Problem, dt: float) -> Excitation:
@@ -246,16 +254,6 @@ class Watch(Observer):
                 moved[self._nodes, axis] = view.node_motion(name, False)
             for one in self._seen:
                 one.add(view.time, moved)
-
-
-Row = dict[str, Any]
-TABLE, OBSTACLES = "waves.csv", "obstacles.csv"
-# Snapshots that show waves up to 20 Hz, and five of them a period at 20 Hz [s].
-SNAPSHOT_EVERY = 0.01
-# Of a blow, whose waves are shorter [s].
-BLOW_EVERY = 0.004
-# Length of line that is shown behind and ahead of the train [m].
-_BEHIND, _AHEAD = 300.0, 200.0
 
 
 def study_waves(folder: Path) -> tuple[str, list[Path]]:

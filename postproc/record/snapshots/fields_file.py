@@ -56,6 +56,20 @@ logger = logging.getLogger("catenary.fields")
 
 # Rows of a table that are copied at once.
 _ROWS_OF_COPY = 1 << 16
+_HIDE, _END = b"<![CDATA[", b"]]>"
+_SHOW = b" " * len(_HIDE)
+_BEGIN = b"""\
+<?xml version="1.0" encoding="UTF-8"?>
+<Xdmf Version="3.0">
+  <Domain>
+    <Grid Name="line" GridType="Collection" CollectionType="Spatial">
+"""
+_CLOSE = b"    </Grid>\n  </Domain>\n</Xdmf>\n"
+_BLOCK_CLOSE = b"      </Grid>\n"
+# Readers take the numbers from their places in the file, as they stand there.
+_KINDS = {
+    "<f4": ("Float", 4), "<f8": ("Float", 8), "<i4": ("Int", 4), "|i1": ("Char", 1),
+}  # fmt: skip
 
 
 class FieldsFile:
@@ -319,22 +333,6 @@ def _create(
 def _place_of(group: h5py.Group, name: str) -> int:
     """Offset of a table in the file [B], 0 if it has no numbers; KeyError without one."""
     return h5d.open(group.id, name.encode()).get_offset() or 0
-
-
-_HIDE, _END = b"<![CDATA[", b"]]>"
-_SHOW = b" " * len(_HIDE)
-_BEGIN = b"""\
-<?xml version="1.0" encoding="UTF-8"?>
-<Xdmf Version="3.0">
-  <Domain>
-    <Grid Name="line" GridType="Collection" CollectionType="Spatial">
-"""
-_CLOSE = b"    </Grid>\n  </Domain>\n</Xdmf>\n"
-_BLOCK_CLOSE = b"      </Grid>\n"
-# Readers take the numbers from their places in the file, as they stand there.
-_KINDS = {
-    "<f4": ("Float", 4), "<f8": ("Float", 8), "<i4": ("Int", 4), "|i1": ("Char", 1),
-}  # fmt: skip
 
 
 class GrowingXdmf:

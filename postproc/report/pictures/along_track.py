@@ -36,6 +36,11 @@ from catenary.postproc.report.pictures.figures import (
 
 # More supports or droppers than these are no marks but a grey ground: they are left out.
 _MOST_SUPPORTS, _MOST_DROPPERS = 200, 1000
+_PLACE = "position along the track [m]"
+# Label, places along the track (n,) [m], and values (n,) there.
+Curve = tuple[str, np.ndarray, np.ndarray]
+# Marks of a panel: those of equal values let each other be seen.
+_MARKS = ("o", "x", "^", "s")
 
 
 @own_style()
@@ -170,13 +175,6 @@ def with_margin(x: np.ndarray) -> tuple[float, float]:
         return 0.0, 1.0
     margin = 0.015 * max(float(np.ptp(x)), 1.0)
     return float(x.min()) - margin, float(x.max()) + margin
-
-
-_PLACE = "position along the track [m]"
-# Label, places along the track (n,) [m], and values (n,) there.
-Curve = tuple[str, np.ndarray, np.ndarray]
-# Marks of a panel: those of equal values let each other be seen.
-_MARKS = ("o", "x", "^", "s")
 
 
 @figures.own_style()

@@ -60,6 +60,10 @@ if TYPE_CHECKING:
 _FAR = 20.0
 # Evaluated arms whose passage is drawn.
 _MOST_ARMS = 60
+# Change of tension that is allowed [%].
+_ALLOWED = 10.0
+# A channel in metres that stays below this is drawn in millimetres [m].
+_SMALL = 0.1
 
 
 @own_style()
@@ -314,10 +318,6 @@ def plan_view(results: Results) -> Figure:
     return figure
 
 
-# Change of tension that is allowed [%].
-_ALLOWED = 10.0
-
-
 @own_style()
 def draw_temperatures(rests: Sequence[LineAtTemperature]) -> Figure:
     """A picture of a line at rest at each of several temperatures. Not collective."""
@@ -359,10 +359,6 @@ def draw_temperatures(rests: Sequence[LineAtTemperature]) -> Figure:
     if names:
         ends.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
     return figure
-
-
-# A channel in metres that stays below this is drawn in millimetres [m].
-_SMALL = 0.1
 
 
 def channel_pictures(results: Results) -> list[tuple[str, str, Callable[[], Figure | None]]]:

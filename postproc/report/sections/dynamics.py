@@ -32,6 +32,8 @@ _ROWS = (
     ("losses of 5 ms and longer", "arcing_percent", "%", 1.0, 3),
     ("contact height range", "contact_height_range", "mm", 1e3, 1),
 )
+# Places that a table shows all of, and extremes of each kind that it shows of more.
+_FEW, _EXTREMES = 12, 5
 
 
 def contact_force(run: EvaluatedRun) -> Section:
@@ -89,10 +91,6 @@ def _force_pictures(run: EvaluatedRun) -> Iterator[Picture]:
     if known:
         text = "Histogram of the contact force in the evaluation stretch, below 20 Hz."
         yield Picture("histogram", text, lambda: forces.force_histogram(statistics))
-
-
-# Places that a table shows all of, and extremes of each kind that it shows of more.
-_FEW, _EXTREMES = 12, 5
 
 
 def has_statistics(run: EvaluatedRun) -> bool:
