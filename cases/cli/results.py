@@ -199,7 +199,7 @@ def _compare_measured(
         found = compare_with(results, passage_of(table, file, wanted, beside, results))
     console.say(compared.as_text(found))
     if out is not None:
-        console.say("\n" + "\n".join(map(str, compared.write(out, found))))
+        console.say("\n" + "\n".join(map(str, compared.write_comparison(out, found))))
 
 
 @serial_verb(

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
+    from catenary.meshgen.line import Line
+    from catenary.meshgen.mesh import LineMesh
     from catenary.solver.statics.elasticity import Elasticity
     from catenary.solver.statics.form_finding import Equilibrium
 

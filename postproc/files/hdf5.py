@@ -181,6 +181,11 @@ def broken_seals(place: h5py.HLObject, values: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _sum_of(value: Any) -> int:
+    """CRC-32 of an attribute's value as Python's own type."""
+    return zlib.crc32(repr(value).encode())
+
+
 def seal_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
     """Store one checksum of the arrays of a group, ``arrays`` by name."""
     set_attribute(group, ARRAYS_SUM, sum_of_arrays(arrays))
@@ -225,11 +230,6 @@ def create_checked(file: h5py.Group, path: str, values: Any) -> h5py.Dataset:
     """A dataset with HDF5's own checksum; an empty one has nothing to check."""
     array = np.asarray(values)
     return file.create_dataset(path, data=array, fletcher32=bool(array.size) and array.ndim > 0)
-
-
-def _sum_of(value: Any) -> int:
-    """CRC-32 of an attribute's value as Python's own type."""
-    return zlib.crc32(repr(value).encode())
 
 
 def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.evaluate.wording import UNCOMPARED
+from catenary.postproc.evaluate.wording import UNCOMPARED, VERDICTS
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.measurements.alignment import Alignment
 from catenary.postproc.report.page import Picture, Section, Text, page
@@ -152,7 +152,6 @@ def figures_table(found: Comparison) -> StudyTable:
         Column("because", "because"),
         Column("source"),
     ]
-    words = {True: "passed", False: "FAILED", None: "not judged"}
     return StudyTable(
         columns,
         [
@@ -164,7 +163,7 @@ def figures_table(found: Comparison) -> StudyTable:
                 "measured": one.measured,
                 "difference": one.run - one.measured,
                 "tolerance": None if np.isnan(one.tolerance) else one.tolerance,
-                "verdict": words[one.passed]
+                "verdict": VERDICTS[one.passed]
                 + (f" {UNCOMPARED}" if one.source == LINE_TEST and one.passed is not None else ""),
                 "because": one.because,
                 "source": one.source if not np.isnan(one.tolerance) else "",
@@ -228,7 +227,7 @@ def uplifts_table(found: Comparison) -> StudyTable:
     return StudyTable(columns, rows, "Largest uplifts at supports")
 
 
-def write(folder: Path, found: Comparison) -> list[Path]:
+def write_comparison(folder: Path, found: Comparison) -> list[Path]:
     """Write page, tables, JSON and pictures into a folder; returns the files. Not collective.
 
     Parameters
@@ -248,8 +247,8 @@ def write(folder: Path, found: Comparison) -> list[Path]:
     ]
     own = found.uplift
     uplifts = own and [("run", own.place, own.run), ("measured", own.place, own.measured)]
-    pictures = painted(_FORCE, lambda: along_track.forces(panels))
-    pictures |= painted(_UPLIFT, lambda: along_track.uplifts(uplifts or ()))
+    pictures = painted(_FORCE, lambda: along_track.overlaid_forces(panels))
+    pictures |= painted(_UPLIFT, lambda: along_track.overlaid_uplifts(uplifts or ()))
     content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
     content[FIGURES], content[FORCES] = figures_table(found).csv(), forces_table(found).csv()
     if found.uplift is not None:

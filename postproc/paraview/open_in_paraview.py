@@ -183,10 +183,11 @@ def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> d
     data, grids = scenery.data, {name: list[str]() for name in scenery.parts}
     # In memory: HDF5 crashes the interpreter at its end where a disk has refused a write.
     with h5py.File(_NUMBERS, "w", driver="core", backing_store=False) as file:
+        put = file.create_dataset
         still = {
             name: (
-                _topology(_put(file, f"{name}/cells", part.cells.astype(np.int32))),
-                [_put(file, f"{name}/{own}", values.astype(np.int32))
+                _topology(put(f"{name}/cells", data=part.cells.astype(np.int32))),
+                [put(f"{name}/{own}", data=values.astype(np.int32))
                  for own, values in part.fields.items()],
             )
             for name, part in scenery.parts.items()
@@ -197,12 +198,12 @@ def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> d
                 if k and not moves:
                     continue
                 at = f"{name}/{k:06d}"
-                fields = [_put(file, f"{at}/displacement", moved.astype("<f4"))]
+                fields = [put(f"{at}/displacement", data=moved.astype("<f4"))]
                 if name == FORCES:
                     force = np.zeros((data.n_pantographs, 3), dtype="<f4")
                     force[:, 2] = data.force[data.row_at(time)]
-                    fields.append(_put(file, f"{at}/force", force))
-                points = _put(file, f"{at}/points", rest)
+                    fields.append(put(f"{at}/force", data=force))
+                points = put(f"{at}/points", data=rest)
                 grids[name].append(
                     _grid(topology, points, fields, of_cells, time if moves else None)
                 )
@@ -210,15 +211,8 @@ def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> d
         write_whole(folder / _NUMBERS, bytes(file.id.get_file_image()))
     files = {name: folder / f"{name}.xdmf" for name in grids}
     for name, path in files.items():
-        write_whole(path, _text(name, grids[name]))
+        write_whole(path, _xdmf_text(name, grids[name]))
     return files
-
-
-# ---- XDMF --------------------------------------------------------------------------------------
-
-
-def _put(file: h5py.File, path: str, values: np.ndarray) -> h5py.Dataset:
-    return file.create_dataset(path, data=values)
 
 
 def _item(table: h5py.Dataset) -> str:
@@ -257,7 +251,7 @@ def _grid(
     return "\n".join(parts)
 
 
-def _text(name: str, grids: list[str]) -> str:
+def _xdmf_text(name: str, grids: list[str]) -> str:
     """A file of grids, of which several are one after another in time."""
     whole = [f'<Grid Name="{name}" GridType="Uniform">{grid}\n</Grid>' for grid in grids]
     if len(grids) > 1:

@@ -264,20 +264,20 @@ def pdf(html: str) -> bytes:
     CSS, HTML, URLFetcher = _weasyprint()
     fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
     cache: dict[str, Any] = {}  # of pictures, which are laid out twice
-    page = HTML(string=html, url_fetcher=fetcher)
+    document = HTML(string=html, url_fetcher=fetcher)
     # Folded parts are not printed; without them large tables are laid out in a third.
-    for folded in page.etree_element.iter("details"):
+    for folded in document.etree_element.iter("details"):
         folded[:] = folded.findall("summary")
-    figures = list(page.etree_element.iter("figure"))
+    figures = list(document.etree_element.iter("figure"))
     for n, figure in enumerate(figures):
         figure.set("id", f"figure-{n}")
-    layout = page.render(stylesheets=[CSS(string=_ENDLESS)], cache=cache)
+    layout = document.render(stylesheets=[CSS(string=_ENDLESS)], cache=cache)
     tops = {name: (box[1], box[3]) for name, box in layout.pages[0].anchors.items()}
     boxes = [tops.pop(figure.get("id")) for figure in figures]
     found = shares(boxes, [top for top, _ in tops.values()])
     for figure, share in zip(figures, found, strict=True):
         figure.set("style", f"--share: {share:.3f}")
-    return bytes(page.write_pdf(cache=cache))
+    return bytes(document.write_pdf(cache=cache))
 
 
 def shares(figures: Sequence[tuple[float, float]], headings: Sequence[float]) -> list[float]:

@@ -493,7 +493,7 @@ def test_a_validation_takes_a_comparison_as_its_line_test(
 ) -> None:
     """A force sensor shows 4 N too much, of which the description allows 2.5 N."""
     off = table.assign(force_N=table["force_N"] + 4.0)
-    compared.write(tmp_path, found_in(run, off, tolerances={"mean_N": 2.5}))
+    compared.write_comparison(tmp_path, found_in(run, off, tolerances={"mean_N": 2.5}))
     step = line_test(tmp_path)
     rows = {row["quantity"]: row for row in step.rows}
     mean = rows["mean [N]"]

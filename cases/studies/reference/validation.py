@@ -243,7 +243,7 @@ def judged_files(others: Sequence[Others]) -> dict[str, Content]:
             for of, force in one.forces.items()
         ]
         if panels:
-            pictures |= figures.painted(about.name, partial(along_track.forces, panels))
+            pictures |= figures.painted(about.name, partial(along_track.overlaid_forces, panels))
         own = replace(table, rows=judged(one.solution, one.figures), title="")
         blocks: list[Text | StudyTable] = [Text(about.data), own]
         blocks += [Text(text, "remark") for text in one.remarks]

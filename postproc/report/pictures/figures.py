@@ -52,10 +52,11 @@ _SHARED_GAP = 0.44
 _MOST_TICKS, STEPS = (8, 5), (1.0, 2.0, 2.5, 5.0, 10.0)
 # Compression of a PNG: a higher level costs half as much time again and saves a twentieth.
 _LEVEL = 3
-_in_own_style = False
 # Curves of fewer points are drawn as they are; of others two points a bin, the smallest and the
 # largest value: several bins for each dot of a picture.
 MOST_POINTS, _BINS = 20_000, 5_000
+
+_in_own_style = False  # whether a function of ``own_style`` is at work
 
 
 class FewTicks(MaxNLocator):

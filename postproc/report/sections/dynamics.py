@@ -68,7 +68,6 @@ def _violations(results: Results) -> list[list[str]]:
 
 def _force_pictures(run: EvaluatedRun) -> Iterator[Picture]:
     from catenary.postproc.report.pictures import force_pictures as forces
-    from catenary.postproc.report.pictures.force_pictures import lateral_places
 
     results, statistics = run.results, run.statistics
     if results.n_rows("time") < 2:
@@ -83,7 +82,7 @@ def _force_pictures(run: EvaluatedRun) -> Iterator[Picture]:
         yield Picture("wire_forces", text, lambda: forces.wire_forces(results))
     if results.has("lateral_place"):
         text = "Lateral position of the contact wires on the strips."
-        yield Picture("lateral_place", text, lambda: lateral_places(results))
+        yield Picture("lateral_place", text, lambda: forces.lateral_places(results))
     known = len(statistics.pantographs) - len(statistics.complaints)
     if known > 1:  # of one the table says it all
         text = "Statistics of the contact force in the evaluation stretch, below 20 Hz."
