@@ -23,7 +23,7 @@ from catenary.callers import (
     temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
-from catenary.cases.result_folder.output_folder import run_folder
+from catenary.cases.result_folder.output_folder import refuse_impossible, run_folder
 from catenary.scenes import SceneLike, checked, draft_of, scene_of
 
 if TYPE_CHECKING:
@@ -191,7 +191,6 @@ def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None)
     InputError
         If there is no run, or as ``cases.run.continuing.extended_scene``.
     """
-    from catenary.cases.result_folder.output_folder import refuse_impossible
     from catenary.cases.run.continuing import EVALUATE, UNTIL, extended_scene
     from catenary.postproc.read.guard import examined
     from catenary.postproc.read.results import Results

@@ -17,10 +17,17 @@ import typer
 import catenary
 from catenary.base.errors import InputError
 from catenary.base.files import is_folder
+from catenary.base.parallel import (
+    abort_on_unforeseen_error,
+    launched_by_mpirun,
+    on_root,
+    set_up_logging,
+)
 from catenary.cases.cli import command_words
 from catenary.cases.cli.command_words import Verb
 from catenary.cases.result_folder.output_folder import run_folder
 from catenary.cases.terminal import console
+from catenary.postproc.evaluate.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -310,7 +317,6 @@ def crowded(comm: Any) -> str:
     if comm.size == 1 or not hasattr(os, "sched_getaffinity"):  # the latter: not Linux
         return ""
     from catenary.base.mpi import MPI
-    from catenary.postproc.evaluate.wording import counted
 
     here = comm.Split_type(MPI.COMM_TYPE_SHARED)
     n_ranks, n_cores = here.size, len(set().union(*here.allgather(os.sched_getaffinity(0))))
@@ -332,12 +338,6 @@ def begin(
     Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
     whose ``[petsc]`` table stands before them.
     """
-    from catenary.base.parallel import (
-        abort_on_unforeseen_error,
-        launched_by_mpirun,
-        on_root,
-        set_up_logging,
-    )
     from catenary.cases.process.petsc_options import (
         as_arguments,
         idle_options,

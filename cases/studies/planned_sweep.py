@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.base.parallel import on_root
+from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import refuse_earlier
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.sweep.jobs import HISTORIES, Ended, Part, RunOptions, check_names
@@ -71,7 +72,6 @@ class PlannedSweep(NamedTuple):
             no picture of None
         histogram : whether histograms of the contact forces are written too
         """
-        from catenary.cases.result_folder.folder_lock import held
 
         with held(self.out, comm, command):
             on_root(comm, lambda: refuse_earlier(self.out, options.force))

@@ -15,6 +15,7 @@ import typer
 import catenary
 from catenary.base.errors import InputError
 from catenary.base.files import is_folder
+from catenary.base.process import alone
 from catenary.cases.cli.app import (
     Force,
     Jobs,
@@ -31,6 +32,7 @@ from catenary.cases.cli.app import (
     serial_verb,
     verb,
 )
+from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 
@@ -200,7 +202,6 @@ def run_study(words: RunWords, out: Path, runs: StudyRuns, part: str | None) -> 
         return make_plan(words.case, changes, words.shortened), options
 
     comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene)
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import case_study
 
     if own is not None:
@@ -281,8 +282,6 @@ def merge(
     force: Force = False,
 ) -> None:
     """Serial."""
-    from catenary.base.process import alone
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import merged_sweeps
     from catenary.cases.studies.sweep.output import RECORD
     from catenary.cases.studies.uncertainty import output

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
+from catenary.base.parallel import launched_by_mpirun, on_root
 from catenary.cases.cli import command_words
 from catenary.cases.cli.app import (
     Force,
@@ -30,6 +31,7 @@ from catenary.cases.cli.app import (
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
+from catenary.postproc.evaluate.wording import counted
 
 if TYPE_CHECKING:
     from catenary.cases.studies.accuracy.runs import Plan
@@ -100,7 +102,6 @@ def accuracy(
     from catenary.cases.studies.accuracy import output
     from catenary.cases.studies.accuracy import runs as study
     from catenary.cases.studies.records import held_study
-    from catenary.postproc.evaluate.wording import counted
 
     with held_study(out, comm, f"catenary accuracy {words.case}") as held:
         found, ended = study.run(plan, out, comm, options)
@@ -148,7 +149,6 @@ def hard(
     from catenary.cases.studies.hard import checks
     from catenary.cases.studies.records import held_study
     from catenary.cases.terminal.runs_bar import RunsBar
-    from catenary.postproc.evaluate.wording import counted
     from catenary.postproc.report.study_table import remark_lines
 
     if comm.size > 1 and runs.n_jobs != 1:
@@ -249,7 +249,6 @@ def scaling(
     ] = None,
 ) -> int:
     """Collective."""
-    from catenary.base.parallel import launched_by_mpirun, on_root
     from catenary.cases.run.cluster import Wire, Work, work_of
     from catenary.cases.studies import scaling as study
     from catenary.cases.studies.sweep.variants import whole_numbers
@@ -403,7 +402,6 @@ def validate(
         return (study.jobs_of_validation(), study.line_test(measured)), []
 
     comm, (jobs, tested), options = runs.begin(read, lambda made: made[0][0].scene)
-    from catenary.base.parallel import on_root
     from catenary.cases.studies.accuracy.runs import RUNS
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.reference import validation

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from catenary.base.errors import InputError
@@ -190,7 +191,6 @@ def inverse(
 
 def _function(frozen: Any) -> Callable[[np.ndarray], np.ndarray]:
     """The inverse function of SciPy's distribution; ValueError where its numbers are not finite."""
-    import numpy as np
 
     def values(probabilities: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
@@ -205,7 +205,6 @@ def _function(frozen: Any) -> Callable[[np.ndarray], np.ndarray]:
 def chosen(table: ChoicesTable, probabilities: np.ndarray) -> list[int]:
     """Number of the value, from 0, for each of ``probabilities`` in (0, 1), by the weights of the
     values of a ``table``."""
-    import numpy as np
 
     weights = np.ones(len(table.values)) if table.weights is None else np.array(table.weights)
     ends = np.cumsum(weights) / weights.sum()
