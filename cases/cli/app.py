@@ -16,7 +16,6 @@ import typer
 
 import catenary
 from catenary.base.errors import InputError
-from catenary.base.files import is_folder
 from catenary.base.parallel import (
     abort_on_unforeseen_error,
     launched_by_mpirun,
@@ -25,7 +24,7 @@ from catenary.base.parallel import (
 )
 from catenary.cases.cli import command_words
 from catenary.cases.cli.command_words import Verb
-from catenary.cases.result_folder.output_folder import run_folder
+from catenary.cases.result_folder.output_folder import refuse_no_folder, run_folder
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
 
@@ -376,9 +375,13 @@ def records_of(folder: Path) -> Records | None:
     """
     from catenary.postproc.read.guard import examined
 
-    if not is_folder(folder):
-        raise InputError(f"{folder} is no folder; name the folder of a run")
+    refuse_no_folder(folder)
     return examined(folder)
+
+
+def names_in(text: str | None) -> list[str]:
+    """The names of a list with commas, none without it."""
+    return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def print_findings(text: str, files: Sequence[Path]) -> None:

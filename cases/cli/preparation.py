@@ -20,6 +20,7 @@ from catenary.cases.cli.app import (
     Jobs,
     SceneWords,
     folder_option,
+    names_in,
     print_findings,
     serial_verb,
 )
@@ -92,7 +93,7 @@ def plan(
             200.0 if stretch is None else _within("--stretch-m", stretch, 1.0, 1e7),
             10 if rounds is None else int(_within("--rounds", rounds, 1, _MOST_ROUNDS)),
             wanted,
-            [] if only is None else [name.strip() for name in only.split(",")],
+            names_in(only),
         )
         return _cost(options, out, as_json, n_jobs, force)
     belonging = {

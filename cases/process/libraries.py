@@ -1,10 +1,10 @@
 """Libraries: their settings before they are loaded, memory to load them, and their versions.
 
-The settings are not for other people's Python programs.
+``choose_settings`` is for the program, not for other people's Python programs.
 
-Pictures have the program's own style, and Matplotlib a folder for its cache. It reads a
-``matplotlibrc`` at import: that in the working directory, else that of ``MATPLOTLIBRC``, else that
-of the user. One that is no text ends the import.
+Pictures have the program's own style, and Matplotlib a folder for its cache. At its import it reads
+a ``matplotlibrc``: that in the working directory, else that of ``MATPLOTLIBRC``, else that of the
+user. One that is no text ends the import.
 """
 
 from __future__ import annotations

@@ -63,6 +63,11 @@ class Wire(NamedTuple):
         return self.latency + n_bytes * self.per_byte
 
 
+# Messages between nodes of a cluster, where they were not measured: 5 us and 5 GB/s, which today's
+# networks do better. They decide by how much ranks of short lines wait for each other.
+USUAL = Wire(5e-6, 2e-10)
+
+
 class Sizes(NamedTuple):
     """Messages of a step [B]: to a neighbour, to rank 0 and back from there."""
 
@@ -149,11 +154,6 @@ def predict(work: Work, wire: Wire, ranks: int) -> Predicted:
         levels * (wire.message(sizes.share) + wire.message(sizes.reply)),
         work.fixed + _ONE_BY_ONE,
     )
-
-
-# Messages between nodes of a cluster, where they were not measured: 5 us and 5 GB/s, which today's
-# networks do better. They decide by how much ranks of short lines wait for each other.
-USUAL = Wire(5e-6, 2e-10)
 
 
 def march_on(problem: Problem, needs: Needs, n_unknowns: int, ranks: int) -> float:

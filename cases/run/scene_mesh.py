@@ -114,11 +114,15 @@ def line_figure(
         middle = int(np.clip(judged, first, last - 1))
         spans = max(middle - 1, 0), min(middle + 2, line.n_spans)
     stretch = float(masts[spans[0]]), float(masts[spans[1]])
-    lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
-    known = [0.5 * length for length in lengths if length is not None]
     marks = [
         Mark(fact["at_m"], fact["wire"], fact["says"])
         for fact in defect_facts(scene, problem)
         if "at_m" in fact
     ]
-    return draw_line(line, mesh, form, stretch, min(known, default=None), marks), stretch
+    return draw_line(line, mesh, form, stretch, half_head_of(scene), marks), stretch
+
+
+def half_head_of(scene: Scene) -> float | None:
+    """Half of the shortest strip on the train [m], None where no length is known."""
+    lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
+    return min((0.5 * length for length in lengths if length is not None), default=None)

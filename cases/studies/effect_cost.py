@@ -24,7 +24,7 @@ from catenary.cases.process.interrupts import Phase
 from catenary.cases.run.prepared import rest_of
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
 from catenary.cases.scene.input.case_files import Assigned
-from catenary.cases.scene.input.faults import shown
+from catenary.cases.scene.input.faults import shown_word
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene, end_of, problem_of
 from catenary.cases.studies.sweep.jobs import (
@@ -384,8 +384,9 @@ def _named(effects: SwitchableEffects, names: Sequence[str]) -> list[Switch]:
         if name in effects.always:
             raise InputError(f"--only {name}: it is part of every scene and cannot be left out")
         if name not in known:
-            told = shown(name)[1:-1] or shown(name)
-            raise InputError(f"--only {told} is no effect; there are {', '.join(known)}")
+            raise InputError(
+                f"--only {shown_word(name)} is no effect; there are {', '.join(known)}"
+            )
     return [known[name] for name in dict.fromkeys(names)]
 
 

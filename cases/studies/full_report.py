@@ -232,7 +232,7 @@ def line_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
 
 def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
     line, damping = problem.line, simulated(problem).damping
-    rows, bending = [], _alike([wire.bending_stiffness for wire in line.wires])
+    rows, bending = [], _with_equal_decimals([wire.bending_stiffness for wire in line.wires])
     for wire, stiffness in zip(line.wires, bending, strict=True):
         alpha, beta = damping.per_component.get(wire.name, (damping.alpha, damping.beta))
         rows.append([
@@ -378,13 +378,13 @@ def _range(values: np.ndarray, digits: int) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _alike(values: Sequence[float]) -> list[str]:
+def _with_equal_decimals(values: Sequence[float]) -> list[str]:
     """Figures of a column, with the decimals that the one with most of them has."""
     decimals = max(len(f"{value:.9g}".partition(".")[2]) for value in values)
     return [number(value, decimals) for value in values]
 
 
-def _plain(name: str) -> str:
+def _spaced(name: str) -> str:
     return name.replace("_", " ")
 
 
@@ -401,8 +401,8 @@ def pantographs_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
             length = "assumed" if placement.data.strips.length is None else "to scale"
             how = "sketched from the side and from the front: "
             how += f"springs and arms are schematic, the strips' length is {length}"
-        text = f"Pantograph {_plain(name)}, {how}."
-        pictures.append(Picture(file, text, partial(_drawn_pantograph, placement.data)))
+        text = f"Pantograph {_spaced(name)}, {how}."
+        pictures.append(Picture(file, text, partial(_draw_pantograph, placement.data)))
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
 
 
@@ -410,10 +410,10 @@ def _pantograph_blocks(
     kinds: dict[str, tuple[Placement, str]],
 ) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
-        yield Text(f"{description}.", "", f"{_plain(name)}:")
+        yield Text(f"{description}.", "", f"{_spaced(name)}:")
         data = placement.data
         if isinstance(data, LumpedData):
-            columns = map(_alike, (data.masses, data.stiffnesses, data.dampings))
+            columns = map(_with_equal_decimals, (data.masses, data.stiffnesses, data.dampings))
             rows = [
                 [f"{n}{' (head)' if n == 1 else ''}", *own]
                 for n, own in enumerate(zip(*columns, strict=True), start=1)
@@ -421,7 +421,7 @@ def _pantograph_blocks(
             heads = ["mass", "mass [kg]", "stiffness below [N/m]", "damping below [N s/m]"]
             yield texts_table(heads, rows, {1, 2, 3})
         else:
-            rows = [[_plain(body.name), f"{body.mass:g}", *(f"{i:g}" for i in body.inertia)]
+            rows = [[_spaced(body.name), f"{body.mass:g}", *(f"{i:g}" for i in body.inertia)]
                     for body in data.system.bodies]  # fmt: skip
             heads = ["body", "mass [kg]", "Ixx [kg m²]", "Iyy [kg m²]", "Izz [kg m²]"]
             yield texts_table(heads, rows, {1, 2, 3, 4})
@@ -442,7 +442,7 @@ def _pantograph_blocks(
 
 
 @own_style()
-def _drawn_pantograph(data: Any) -> Figure:
+def _draw_pantograph(data: Any) -> Figure:
     """A pantograph from the side and from the front, heights above its base."""
     shape = shape_of(data)
     n_places = data.n_masses if isinstance(data, LumpedData) else 1
@@ -510,18 +510,18 @@ def _worst_pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
             f"Contact force of {in_sentence(who)} in the worst span and the two beside it, and "
             "height of the contact wire above the rail."
         )
-        yield Picture("worst_span", text, lambda: _span(results, passage))
+        yield Picture("worst_span", text, lambda: _draw_span(results, passage))
     for name, spots, what in (
         ("worst_dropper", places.forces, "Force of the dropper with the largest force"),
         ("longest_slack", places.slack, "Force of the dropper that is slack the longest"),
     ):
         for spot in spots[:1]:
             caption = f"{what}, {spot.place}, as the train passes."
-            yield Picture(name, caption, partial(_passage, results, spot))
+            yield Picture(name, caption, partial(_draw_passage, results, spot))
 
 
 @own_style()
-def _span(results: Results, passage: Passage) -> Figure:
+def _draw_span(results: Results, passage: Passage) -> Figure:
     """Contact force, and height of the contact point, in a span with those beside it."""
     length = passage.end - passage.start
     low, high = passage.start - length, passage.end + length
@@ -560,7 +560,7 @@ def _span(results: Results, passage: Passage) -> Figure:
 
 
 @own_style()
-def _passage(results: Results, spot: Spot) -> Figure:
+def _draw_passage(results: Results, spot: Spot) -> Figure:
     """Force of a dropper over the place of the leading pantograph."""
     leader = int(np.argmax(results.first_position))
     place = results.column("contact_position", leader)[:: results.line_record.every]

@@ -85,6 +85,7 @@ class PlannedSweep(NamedTuple):
         self, ended: list[Ended], plotted: Sequence[str] | None, histogram: bool
     ) -> tuple[list[Path], Uncertainty | None]:
         """The files of a sweep that ended, and what samples say. Not collective."""
+        from catenary.cases.studies.sweep.histories import FILE
         from catenary.cases.studies.sweep.output import files_of, table_of
         from catenary.cases.studies.uncertainty.output import write_evaluated
 
@@ -93,7 +94,7 @@ class PlannedSweep(NamedTuple):
         case, scene = own.first.case.name, own.draft.table()
         files = write_files(self.out, files_of(case, ended, lines, histogram, scene))
         if not isinstance(own, WholeRuns) and own.histories:
-            files += [path for path in (self.out / "histories.h5",) if path.is_file()]
+            files += [path for path in (self.out / FILE,) if path.is_file()]
         if self.sampling is not None:
             rows = table_of(ended).records()
             evaluated, more = write_evaluated(self.out, rows, self.sampling, plotted or ())

@@ -6,7 +6,8 @@ Attributes above 4 KiB and arrays without a filter have none either: they get a 
 
 Arrays, attributes and rows of growing tables are written by HDF5's own calls; for arrays and
 attributes these take a fourth to a third of the time of h5py's general ones, which find out anew
-what is the same for all of ours: numbers in contiguous arrays, written as they are.
+what is the same for all of ours: numbers in contiguous arrays, written as they are. Tables are read
+by blocks of rows: memory does not grow with a run.
 
 HDF5 follows links and external storage by itself. A file from a stranger could so read, and a run
 that is continued overwrite, any file of the user: ``open_own`` opens no file that links to another

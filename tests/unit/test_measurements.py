@@ -144,7 +144,9 @@ def test_a_damaged_run_is_told_and_one_that_ends_before_the_stretch_refused(
     assert any("time is damaged from record" in one for one in found_in(tmp_path, table).remarks)
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         file["time"][300:] = np.nan
-    words = r"from 65 to 106\.\d+ m, outside of the compared stretch, 120 to 420 m"
+    words = (
+        r"has the pantograph from 65 to 106\.\d+ m, outside of the compared stretch, 120 to 420 m"
+    )
     with pytest.raises(InputError, match=words):
         found_in(tmp_path, table)
 

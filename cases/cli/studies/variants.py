@@ -1,7 +1,6 @@
-"""The verbs that run many variants of a case: ``sweep``, ``uncertainty``, ``merge``, ``optimise``.
+"""Verbs of many runs: ``sweep``, ``uncertainty``, ``merge``, ``optimise`` and ``tolerance``.
 
-``tolerance`` is one of them, too. ``optimise`` and ``tolerance`` read a task from a file. What
-``run --study`` does stands here as well.
+The last two read a task from a file. What ``run --study`` does stands here as well.
 """
 
 from __future__ import annotations
@@ -28,6 +27,7 @@ from catenary.cases.cli.app import (
     Vary,
     folder_option,
     leave,
+    names_in,
     print_findings,
     serial_verb,
     verb,
@@ -121,7 +121,7 @@ def sweep(
 
     def read() -> tuple[PlannedSweep, list[str]]:
         draft, options = words.draft()
-        check_names(_names(plotted), STATISTICS, "statistic")
+        check_names(names_in(plotted), STATISTICS, "statistic")
         sampling = None
         if sample is None:
             variants = read_variants(vary, named)
@@ -140,7 +140,7 @@ def sweep(
             sampling,
             full_report=reports,
             only_statistics=only_statistics,
-            histories=_names(histories),
+            histories=names_in(histories),
             force=runs.force,
         )
         return made, options
@@ -154,7 +154,7 @@ def sweep(
     if own is not None:
         return verdict(made.run_part(own, comm, options), "sweep")
     command = f"catenary sweep {words.case}"
-    found = made.run(comm, options, command, _names(plotted), histogram)
+    found = made.run(comm, options, command, names_in(plotted), histogram)
     print_findings(found.text, found.files)
     return verdict(found.ended, "sweep")
 
@@ -229,11 +229,6 @@ def verdict(ended: Sequence[Ended], what: str) -> int:
     return console.BROKEN
 
 
-def _names(text: str | None) -> list[str]:
-    """The names of a list with commas."""
-    return [] if text is None else [name.strip() for name in text.split(",")]
-
-
 @serial_verb(
     "uncertainty",
     help="Evaluate the table of a sweep with uncertain keys. It prints quantiles, probabilities "
@@ -283,7 +278,7 @@ def merge(
 ) -> None:
     """Serial."""
     from catenary.cases.studies import merged_sweeps
-    from catenary.cases.studies.sweep.output import RECORD
+    from catenary.cases.studies.sweep.sweep import RECORD
     from catenary.cases.studies.uncertainty import output
 
     parts = merged_sweeps.parts_of(folders)
@@ -316,7 +311,6 @@ class TaskWords(SceneWords):
 
     def make(self, verb: str, study: Callable[..., Made]) -> int:
         """Make the study and print what it found. Serial."""
-
         from catenary.cases.scene.load import read_draft
 
         def read() -> tuple[Draft, Path]:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from catenary.cases.studies.sweep.jobs import Job
 
 _MOST_REPEATS = 99
-TABLES = ("hard.csv", "hard.md")
+HARD, HARD_PAGE = "hard.csv", "hard.md"
 MAP, MAP_PICTURE = "stability_map.csv", "stability_map.png"
 
 
@@ -140,7 +140,7 @@ def hard(
         from catenary.cases.studies.hard.cases import hard_cases
 
         if out is not None:
-            refuse_table(out / TABLES[0], runs.force)
+            refuse_table(out / HARD, runs.force)
         return hard_cases(names)
 
     comm, cases, options = runs.begin(lambda: (read(), []), lambda cases: cases[0].scene())
@@ -169,11 +169,10 @@ def hard(
                 bar.say("\n".join(checks.line(row) for row in rows))
                 bar.ended()
                 found += rows
-        table, page = TABLES
         files = held.write(
             lambda: {
-                table: checks.criteria(found, remarks_of),
-                page: checks.page(cases, found, remarks_of),
+                HARD: checks.criteria(found, remarks_of),
+                HARD_PAGE: checks.page(cases, found, remarks_of),
             }
         )
     failed = [row for row in found if not row.passed]
@@ -395,23 +394,22 @@ def validate(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.reference import validation as study
+    from catenary.cases.studies.reference import validation
 
-    def read() -> tuple[tuple[list[Job], study.Step], list[str]]:
+    def read() -> tuple[tuple[list[Job], validation.Step], list[str]]:
         refuse_table(out / "validation.csv", runs.force)
-        return (study.jobs_of_validation(), study.line_test(measured)), []
+        return (validation.jobs_of_validation(), validation.line_test(measured)), []
 
     comm, (jobs, tested), options = runs.begin(read, lambda made: made[0][0].scene)
     from catenary.cases.studies.accuracy.runs import RUNS
     from catenary.cases.studies.records import held_study
-    from catenary.cases.studies.reference import validation
     from catenary.cases.studies.reference.judgement import any_failed
     from catenary.cases.studies.sweep.jobs import all_ended
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
     with held_study(out, comm, "catenary validate") as held:
         ended = all_ended(run_jobs(jobs, out / RUNS, comm, options), "validation")
-        found = on_root(comm, lambda: study.validate(ended, tested), takes_long=True)
+        found = on_root(comm, lambda: validation.validate(ended, tested), takes_long=True)
         files = held.write(lambda: validation.validation_files(found))
     print_findings(validation.validation_text(found), files)
     return console.NOT_ACCEPTED if strict and any_failed(found.rows) else console.DONE

@@ -358,9 +358,6 @@ def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:
     return StudyTable(columns, [*rows.rows, *broke], title, note)
 
 
-# ---- which reading meets most statements ---------------------------------------------------------
-
-
 def _searched(study: PaperStudy, runs: Mapping[str, StudyRun]) -> dict[str, Rows]:
     """The reading that is searched around, and each option in the place of one of its inputs."""
     around = study.table["search"]["around"]
@@ -402,9 +399,6 @@ def _range(rows: Rows, figure: str, where: Mapping[str, str] | None = None) -> s
         return ""
     low, high = (format(which(values), FIGURES[figure].format) for which in (min, max))
     return f"{low} to {high}"
-
-
-# ---- which input moves what ----------------------------------------------------------------------
 
 
 def rank(start: Rows, varied: Mapping[str, Rows], study: PaperStudy) -> list[Ranked]:
@@ -494,9 +488,6 @@ def _some(titles: Sequence[str]) -> str:
     """The first titles, and how many more there are."""
     more = len(titles) - _NAMED
     return "; ".join(titles[:_NAMED]) + (f" and {more} more" if more > 0 else "")
-
-
-# ---- which separation is critical ----------------------------------------------------------------
 
 
 def _bands(

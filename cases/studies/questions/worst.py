@@ -18,8 +18,7 @@ from catenary.cases.scene.load import recorded_scene
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.statistics import slack_times
-from catenary.postproc.evaluate.wording import wire_words
+from catenary.postproc.evaluate.wording import capital, wire_words
 from catenary.postproc.read.results import Results, in_stretch
 from catenary.postproc.report.study_table import Content, StudyTable, file_table
 from catenary.solver.effects.all_effects import simulated
@@ -44,7 +43,6 @@ _ANCHORED = 1e-9
 _POINTS = 101  # at which profiles of spans are compared
 # Gusts so long before a pantograph comes still move the span, a period of its own motion [s].
 _BEFORE = 1.0
-_FEWEST_LIKES = 3
 NONE = "no cause found"
 _MOST_CAUSES = 4  # of a place in the text; tables have all
 
@@ -138,7 +136,7 @@ def worst_places(results: Results) -> WorstPlaces:
     of_arms = _of_several(results.arm_wires())
     of_droppers = _of_several([names[wire] for wire in results.dropper_wires()[:, 1].tolist()])
     likes = dropper_likes(results)
-    times = slack_times(results)
+    times = stats.slack_times(results)
     passed_to = _passed_to(results)
     arms, hung = (one.evaluated & (one.x <= passed_to) for one in (supports, droppers))
     # One that never carries is missing or loose, and not slack at times.
@@ -428,7 +426,7 @@ class Causes:
     def _elastic(self, span: int) -> Iterator[str]:
         """Softest and stiffest place of a span against those of the others."""
         table = self._elasticities
-        if span not in table or len(table) < _FEWEST_LIKES:
+        if span not in table or len(table) < _FEWEST:
             return
         for word, column in (("softest", 0), ("stiffest", 1)):
             at, own = table[span][column]
@@ -462,7 +460,7 @@ class Causes:
     def _profile(self, span: int) -> Iterator[str]:
         """Height of the contact wire at rest against that of other spans."""
         table = self._profiles
-        if span not in table or len(table) < _FEWEST_LIKES:
+        if span not in table or len(table) < _FEWEST:
             return
         away = table[span] - np.median(np.array(list(table.values())), axis=0)
         worst = int(np.argmax(np.abs(away)))
@@ -496,7 +494,7 @@ class Causes:
         evaluated = in_stretch(x, *self._results.evaluation)
         for number in np.flatnonzero((x >= start) & (x <= end)):
             others = force[(likes == likes[number]) & evaluated]
-            usual = float(np.median(others)) if others.size >= _FEWEST_LIKES else 0.0
+            usual = float(np.median(others)) if others.size >= _FEWEST else 0.0
             if usual > 0.0 and abs(force[number] / usual - 1.0) > _HEAVIER:
                 yield (
                     f"the dropper at {x[number]:.1f} m carries {force[number]:.0f} N at rest, "
@@ -506,7 +504,7 @@ class Causes:
     def _gusts(self, span: int, pantograph: int) -> Iterator[str]:
         """Gusts that are stronger on a span when a pantograph comes than on the others."""
         found = self._gust_forces.get(pantograph, {})
-        if span not in found or len(found) < _FEWEST_LIKES:
+        if span not in found or len(found) < _FEWEST:
             return
         usual = float(np.median(list(found.values())))
         if found[span] > (1.0 + _GUSTIER) * usual:
@@ -562,7 +560,7 @@ def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:
     named = False
     for (noun, by), found in worst_of_each(places, causes, names, count).items():
         named = named or any(candidates not in ([], [NONE]) for _, candidates in found)
-        lines += ["", f"{noun.capitalize()}s by {by}"]
+        lines += ["", f"{capital(noun)}s by {by}"]
         for sentence, candidates in found:
             more = len(candidates) - _MOST_CAUSES
             lines += [f"  {sentence}", *(f"    {text}" for text in candidates[:_MOST_CAUSES])]

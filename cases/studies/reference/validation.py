@@ -36,7 +36,7 @@ from catenary.cases.studies.reference.solutions import (
     UPLIFT,
     configurations,
     figures_of,
-    read,
+    read_solution,
 )
 from catenary.cases.studies.sweep.jobs import Ended, Job, all_done
 from catenary.cases.studies.sweep.variants import Variant
@@ -158,7 +158,7 @@ def validate(ended: Sequence[Ended], measured: Step) -> Validation:
     rules = limits()
     references, elasticity, models = [], [], set()
     for one in configurations():
-        figures, solution = figures_of(summaries[one.name]), read(one.name)
+        figures, solution = figures_of(summaries[one.name]), read_solution(one.name)
         at_rest = {(LINE, name): figures.pop((LINE, name)) for name in _ELASTICITY}
         references += judged(solution, figures)
         if one.model not in models:  # all configurations of a model have one line

@@ -68,7 +68,7 @@ def points(sampling: SamplingTable) -> np.ndarray:
         from SALib.sample import sobol
 
         found = sobol.sample(
-            problem_of(sampling.columns), n, calc_second_order=sampling.second_order, seed=seed
+            salib_problem(sampling.columns), n, calc_second_order=sampling.second_order, seed=seed
         )
     elif sampling.method == "sobol":
         # A power of 2 keeps the balance of the sequence, and its first points are the same.
@@ -81,7 +81,7 @@ def points(sampling: SamplingTable) -> np.ndarray:
     return _correlated(found, sampling) if sampling.correlations else found
 
 
-def problem_of(columns: Sequence[str]) -> dict[str, object]:
+def salib_problem(columns: Sequence[str]) -> dict[str, object]:
     """Inputs as SALib takes them, uniform in the unit cube."""
     bounds = [[0.0, 1.0] for _ in columns]
     return {"num_vars": len(columns), "names": list(columns), "bounds": bounds}
@@ -298,7 +298,7 @@ def _staggers(name: str) -> Callable[[Scene, Line, FieldTable], Carrier]:
 
     def carrier(scene: Scene, line: Line, table: FieldTable) -> Carrier:
         own = np.array(staggered(getattr(scene.line, name) or [0.0], scene.line.n_spans))
-        return Carrier(line.support_positions, own, _filled(_list_of(len(own))))
+        return Carrier(line.support_positions, own, _filled(_list_template(len(own))))
 
     return carrier
 
@@ -309,7 +309,7 @@ def _spans(scene: Scene, line: Line, table: FieldTable) -> Carrier:
             "fields.line.span_m needs one list of all spans; take line.transition.span_m away"
         )
     own, masts = np.array(span_lengths(scene.line)), line.support_positions
-    return Carrier(0.5 * (masts[1:] + masts[:-1]), own, _filled(_list_of(len(own))))
+    return Carrier(0.5 * (masts[1:] + masts[:-1]), own, _filled(_list_template(len(own))))
 
 
 def _defects(scene: Scene, line: Line, table: FieldTable) -> Carrier:
@@ -337,7 +337,7 @@ def _filled(template: str) -> Callable[[np.ndarray], str]:
     return lambda values: template % tuple(values.tolist())
 
 
-def _list_of(n: int) -> str:
+def _list_template(n: int) -> str:
     return f"[{', '.join(['%.7f'] * n)}]"
 
 

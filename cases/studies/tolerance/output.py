@@ -33,152 +33,6 @@ TABLE, RECORD, PAGE = "tolerance.csv", "tolerance.json", "tolerance.md"
 SHARES, VALUES = "tolerance_shares.png", "tolerance_values.png"
 
 
-def _criteria(found: Sequence[Tolerance], most: int) -> list[str]:
-    """The criteria that the line keeps without errors; of more than ``most`` those with the least
-    tolerances."""
-    least: dict[str, float] = {}
-    for one in found:
-        if one.samples is not None and one.criterion != EACH:
-            part = one.level / one.most
-            least[one.criterion] = min(part, least.get(one.criterion, part))
-    shown = sorted(least, key=lambda name: least[name])[:most]
-    return [name for name in least if name in shown]
-
-
-def _axis(one: Tolerance) -> str:
-    return f"errors within ± [{one.unit}]"
-
-
-@figures.own_style()
-def draw_shares(plan: Plan, found: Sequence[Tolerance]) -> Figure | None:
-    """Share of lines that keep each criterion over the level, a panel for each error.
-
-    Bars reach between bounds of Clopper and Pearson, each with the task's confidence, and rings
-    stand at the tolerances. A dot is open where other levels tell of lines that were not run. Where
-    they leave some unknown there is none, and the greatest possible share is a triangle. None if
-    the line keeps no criterion without errors.
-    """
-    names = _criteria(found, _MOST_CURVES)
-    errors = list(dict.fromkeys(one.error for one in found))
-    if not names:
-        return None
-    task = plan.task.samples
-    figure, panels = figures.stacked(0.2 + 2.8 * len(errors), len(errors))
-    deepest = max(0.0, 100.0 - 100.0 * _DEPTH * (1.0 - task.probability))
-    for axes, error in zip(panels, errors, strict=True):
-        shown = [one for one in found if one.error == error and one.criterion in (*names, EACH)]
-        lows = []
-        for number, one in enumerate(shown):
-            assert one.samples is not None  # the line keeps the criterion
-            beside = _BESIDE * one.most * (number - 0.5 * (len(shown) - 1))
-            lows.append(_draw_share(axes, one, one.samples, number, beside, task.confidence))
-        axes.axhline(100.0 * task.probability, ls="--", color=figures.LIMIT, lw=1.0, zorder=1)
-        bottom = max(deepest, min([*lows, 100.0 * task.probability]))
-        axes.set_ylim(bottom - 0.05 * (100.0 - bottom), 100.0 + 0.05 * (100.0 - bottom))
-        last = shown[-1]  # of all criteria, if there are several
-        title = f"{error}, {last.criterion}: {last.text} {last.unit if last.level else ''}"
-        figures.tidy(axes, _axis(last), "lines that keep it [%]", title)
-    lines = [line for axes in panels for line in axes.lines]
-    drawn = {(one.get_marker(), one.get_markersize()) for one in lines if np.size(one.get_xdata())}
-    for (marker, size), label in _MARKS.items():
-        if (marker, size) in drawn:
-            panels[0].plot([], [], marker, ms=size, mfc="none", color=figures.GREY, label=label)
-    wanted = f"{100.0 * task.probability:g} % of all lines"
-    panels[0].plot([], [], "--", color=figures.LIMIT, lw=1.0, label=wanted)
-    figures.legend_above(panels[0])
-    return figure
-
-
-def _draw_share(
-    axes: Axes, one: Tolerance, samples: Samples, number: int, beside: float, confidence: float
-) -> float:
-    """Draw the share for a criterion ``beside`` its levels; returns the least that is shown [%]."""
-    fewest, most = samples.n_kept
-    n = samples.margins.shape[1]
-    known, whole = fewest == most, samples.n_run == n
-    # Of all criteria a curve that leaves those below it to be seen.
-    look, number = (
-        (":", figures.COLOURS.index("#000000"))
-        if one.criterion == EACH
-        else (figures.LINES[number % 3], number)  # none of these is dotted
-    )
-    x, share = samples.levels + beside, 100.0 * most / n
-    figures.curve(axes, x[known], share[known], number, one.criterion, look, 1.5)
-    for of_level, (marker, size), inside in (
-        (known & whole, ("o", 3.5), figures.colour(number)),
-        (known & ~whole, ("o", 3.5), "white"),
-        (~known, _TRIANGLE, "none"),
-        (samples.levels == one.level, _RING, "none"),
-    ):
-        figures.curve(axes, x[of_level], share[of_level], number, None, marker, ms=size, mfc=inside)
-    # Without errors all lines are the same one, of which there is nothing to bound.
-    bounded = known & (samples.levels > 0.0)
-    kept = fewest[bounded].tolist()
-    low = [100.0 * least_share(k, n, confidence) for k in kept]
-    high = [100.0 - 100.0 * least_share(n - k, n, confidence) for k in kept]
-    figures.uprights(axes, x[bounded], low, high, color=figures.colour(number), lw=1.0, alpha=0.7)
-    return float(min([*low, *share]))
-
-
-@figures.own_style()
-def draw_values(found: Sequence[Tolerance]) -> Figure | None:
-    """Worst value of each criterion of all samples over the level beside its limit, a row of panels
-    for each error.
-
-    Grey samples are of levels that were left early, those first that fail elsewhere. Upright lines
-    stand at the tolerances. Runs that broke have no values. None if the line keeps no criterion
-    without errors.
-    """
-    names = _criteria(found, _MOST_PANELS)
-    errors = list(dict.fromkeys(one.error for one in found))
-    if not names:
-        return None
-    figure = figures.new_figure(0.6 + 2.2 * len(errors))
-    panels = figure.subplots(len(errors), len(names), sharey="col", squeeze=False)
-    by_name = {(one.error, one.criterion): one for one in found}
-    for row, error in zip(panels, errors, strict=True):
-        for axes, name in zip(row, names, strict=True):
-            _draw_value(axes, by_name[error, name])
-            most = _MOST_TICKS // len(names)
-            axes.xaxis.set_major_locator(figures.FewTicks(most, steps=figures.STEPS))
-            label = figures.wrapped(axes.get_xlabel(), _WIDTH_OF_LABELS // len(names))
-            axes.set_xlabel(label, fontsize="small")
-        row[0].set_title(error, loc="left", fontsize="medium")
-    of_all = zip(*panels[0, 0].get_legend_handles_labels(), strict=True)
-    drawn = {
-        line.get_label() for axes in panels.flat for line in axes.lines if np.size(line.get_xdata())
-    }
-    handles = [handle for handle, label in of_all if label in drawn]
-    legend = figure.legend(
-        handles=handles, loc="outside upper right", ncols=len(handles), frameon=False,
-        fontsize="small",
-    )  # fmt: skip
-    for handle in legend.get_lines():
-        handle.set(markersize=4.0, alpha=1.0)
-    return figure
-
-
-def _draw_value(axes: Axes, one: Tolerance) -> None:
-    samples, bound = one.samples, one.bound
-    assert samples is not None and bound is not None  # the line keeps the criterion
-    n = samples.margins.shape[1]
-    beside = _SPREAD * one.most * np.linspace(-0.5, 0.5, n)
-    x = samples.levels[:, None] + beside * (samples.levels > 0.0)[:, None]
-    values, is_known = bound.values(samples.margins), np.isfinite(samples.margins)
-    whole = (samples.n_run == n)[:, None]
-    for drawn, colour, label in (
-        (is_known & whole, figures.colour(0), "all lines run"),
-        (is_known & ~whole, figures.GREY, "level left early"),
-    ):
-        figures.curve(
-            axes, x[drawn], values[drawn], 0, label, "o", ms=2.0, mew=0.0, alpha=0.6, color=colour
-        )
-    axes.axhline(bound.limit, ls="--", color=figures.LIMIT, lw=1.2, label="limit")
-    axes.axvline(one.level, color=figures.colour(2), lw=1.2, zorder=1, label="tolerance")
-    figures.tidy(axes, _axis(one), "")
-    axes.set_ylabel(figures.wrapped(bound.meaning), fontsize="small")
-
-
 def files_of(plan: Plan, found: Sequence[Tolerance]) -> dict[str, Content]:
     """All tables and pictures of a study. Not collective."""
     record = {
@@ -337,3 +191,149 @@ def markdown(plan: Plan, found: Sequence[Tolerance]) -> str:
     parts += [f"## {table.title}\n\n{table.markdown()}" for table in tables]
     parts.append("\n".join(f"- {text}" for text in remarks(plan, found)))
     return "\n\n".join(parts) + "\n"
+
+
+@figures.own_style()
+def draw_shares(plan: Plan, found: Sequence[Tolerance]) -> Figure | None:
+    """Share of lines that keep each criterion over the level, a panel for each error.
+
+    Bars reach between bounds of Clopper and Pearson, each with the task's confidence, and rings
+    stand at the tolerances. A dot is open where other levels tell of lines that were not run. Where
+    they leave some unknown there is none, and the greatest possible share is a triangle. None if
+    the line keeps no criterion without errors.
+    """
+    names = _criteria(found, _MOST_CURVES)
+    errors = list(dict.fromkeys(one.error for one in found))
+    if not names:
+        return None
+    task = plan.task.samples
+    figure, panels = figures.stacked(0.2 + 2.8 * len(errors), len(errors))
+    deepest = max(0.0, 100.0 - 100.0 * _DEPTH * (1.0 - task.probability))
+    for axes, error in zip(panels, errors, strict=True):
+        shown = [one for one in found if one.error == error and one.criterion in (*names, EACH)]
+        lows = []
+        for number, one in enumerate(shown):
+            assert one.samples is not None  # the line keeps the criterion
+            beside = _BESIDE * one.most * (number - 0.5 * (len(shown) - 1))
+            lows.append(_draw_share(axes, one, one.samples, number, beside, task.confidence))
+        axes.axhline(100.0 * task.probability, ls="--", color=figures.LIMIT, lw=1.0, zorder=1)
+        bottom = max(deepest, min([*lows, 100.0 * task.probability]))
+        axes.set_ylim(bottom - 0.05 * (100.0 - bottom), 100.0 + 0.05 * (100.0 - bottom))
+        last = shown[-1]  # of all criteria, if there are several
+        title = f"{error}, {last.criterion}: {last.text} {last.unit if last.level else ''}"
+        figures.tidy(axes, _axis(last), "lines that keep it [%]", title)
+    lines = [line for axes in panels for line in axes.lines]
+    drawn = {(one.get_marker(), one.get_markersize()) for one in lines if np.size(one.get_xdata())}
+    for (marker, size), label in _MARKS.items():
+        if (marker, size) in drawn:
+            panels[0].plot([], [], marker, ms=size, mfc="none", color=figures.GREY, label=label)
+    wanted = f"{100.0 * task.probability:g} % of all lines"
+    panels[0].plot([], [], "--", color=figures.LIMIT, lw=1.0, label=wanted)
+    figures.legend_above(panels[0])
+    return figure
+
+
+def _draw_share(
+    axes: Axes, one: Tolerance, samples: Samples, number: int, beside: float, confidence: float
+) -> float:
+    """Draw the share for a criterion ``beside`` its levels; returns the least that is shown [%]."""
+    fewest, most = samples.n_kept
+    n = samples.margins.shape[1]
+    known, whole = fewest == most, samples.n_run == n
+    # Of all criteria a curve that leaves those below it to be seen.
+    look, number = (
+        (":", figures.COLOURS.index("#000000"))
+        if one.criterion == EACH
+        else (figures.LINES[number % 3], number)  # none of these is dotted
+    )
+    x, share = samples.levels + beside, 100.0 * most / n
+    figures.curve(axes, x[known], share[known], number, one.criterion, look, 1.5)
+    for of_level, (marker, size), inside in (
+        (known & whole, ("o", 3.5), figures.colour(number)),
+        (known & ~whole, ("o", 3.5), "white"),
+        (~known, _TRIANGLE, "none"),
+        (samples.levels == one.level, _RING, "none"),
+    ):
+        figures.curve(axes, x[of_level], share[of_level], number, None, marker, ms=size, mfc=inside)
+    # Without errors all lines are the same one, of which there is nothing to bound.
+    bounded = known & (samples.levels > 0.0)
+    kept = fewest[bounded].tolist()
+    low = [100.0 * least_share(k, n, confidence) for k in kept]
+    high = [100.0 - 100.0 * least_share(n - k, n, confidence) for k in kept]
+    figures.uprights(axes, x[bounded], low, high, color=figures.colour(number), lw=1.0, alpha=0.7)
+    return float(min([*low, *share]))
+
+
+@figures.own_style()
+def draw_values(found: Sequence[Tolerance]) -> Figure | None:
+    """Worst value of each criterion of all samples over the level beside its limit, a row of panels
+    for each error.
+
+    Grey samples are of levels that were left early, those first that fail elsewhere. Upright lines
+    stand at the tolerances. Runs that broke have no values. None if the line keeps no criterion
+    without errors.
+    """
+    names = _criteria(found, _MOST_PANELS)
+    errors = list(dict.fromkeys(one.error for one in found))
+    if not names:
+        return None
+    figure = figures.new_figure(0.6 + 2.2 * len(errors))
+    panels = figure.subplots(len(errors), len(names), sharey="col", squeeze=False)
+    by_name = {(one.error, one.criterion): one for one in found}
+    for row, error in zip(panels, errors, strict=True):
+        for axes, name in zip(row, names, strict=True):
+            _draw_value(axes, by_name[error, name])
+            most = _MOST_TICKS // len(names)
+            axes.xaxis.set_major_locator(figures.FewTicks(most, steps=figures.STEPS))
+            label = figures.wrapped(axes.get_xlabel(), _WIDTH_OF_LABELS // len(names))
+            axes.set_xlabel(label, fontsize="small")
+        row[0].set_title(error, loc="left", fontsize="medium")
+    of_all = zip(*panels[0, 0].get_legend_handles_labels(), strict=True)
+    drawn = {
+        line.get_label() for axes in panels.flat for line in axes.lines if np.size(line.get_xdata())
+    }
+    handles = [handle for handle, label in of_all if label in drawn]
+    legend = figure.legend(
+        handles=handles, loc="outside upper right", ncols=len(handles), frameon=False,
+        fontsize="small",
+    )  # fmt: skip
+    for handle in legend.get_lines():
+        handle.set(markersize=4.0, alpha=1.0)
+    return figure
+
+
+def _draw_value(axes: Axes, one: Tolerance) -> None:
+    samples, bound = one.samples, one.bound
+    assert samples is not None and bound is not None  # the line keeps the criterion
+    n = samples.margins.shape[1]
+    beside = _SPREAD * one.most * np.linspace(-0.5, 0.5, n)
+    x = samples.levels[:, None] + beside * (samples.levels > 0.0)[:, None]
+    values, is_known = bound.values(samples.margins), np.isfinite(samples.margins)
+    whole = (samples.n_run == n)[:, None]
+    for drawn, colour, label in (
+        (is_known & whole, figures.colour(0), "all lines run"),
+        (is_known & ~whole, figures.GREY, "level left early"),
+    ):
+        figures.curve(
+            axes, x[drawn], values[drawn], 0, label, "o", ms=2.0, mew=0.0, alpha=0.6, color=colour
+        )
+    axes.axhline(bound.limit, ls="--", color=figures.LIMIT, lw=1.2, label="limit")
+    axes.axvline(one.level, color=figures.colour(2), lw=1.2, zorder=1, label="tolerance")
+    figures.tidy(axes, _axis(one), "")
+    axes.set_ylabel(figures.wrapped(bound.meaning), fontsize="small")
+
+
+def _criteria(found: Sequence[Tolerance], most: int) -> list[str]:
+    """The criteria that the line keeps without errors; of more than ``most`` those with the least
+    tolerances."""
+    least: dict[str, float] = {}
+    for one in found:
+        if one.samples is not None and one.criterion != EACH:
+            part = one.level / one.most
+            least[one.criterion] = min(part, least.get(one.criterion, part))
+    shown = sorted(least, key=lambda name: least[name])[:most]
+    return [name for name in least if name in shown]
+
+
+def _axis(one: Tolerance) -> str:
+    return f"errors within ± [{one.unit}]"

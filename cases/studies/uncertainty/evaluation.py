@@ -15,11 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
-from catenary.cases.studies.sampling.samples import problem_of, sample_name
+from catenary.cases.studies.sampling.samples import salib_problem, sample_name
 from catenary.cases.studies.sampling.tables import SALTELLI, ChoicesTable, SamplingTable, SeedTable
-from catenary.cases.studies.uncertainty.run_table import DONE, RunTable
+from catenary.cases.studies.uncertainty.run_table import RunTable
 from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.files.run_schema import DONE
 
 CONFIDENCE = 0.95
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
@@ -33,270 +35,15 @@ GIVEN_DATA = (
 )
 _SEED = 1  # of resamples
 # Fewer runs leave no harmonics to tell from noise, in half of which bounds are estimated.
-_FEWEST_RUNS, _MANY = 100, 500
+_FEWEST_RUNS, _MANY_RUNS = 100, 500
 _HARMONICS = 4, 10
-# Resamples for bounds, of up to _MOST runs and of more: those have small bounds, at a greater cost.
-_RESAMPLES_OF_INDICES, _MOST = (100, 25), 5000
+# Resamples for bounds, of up to so many runs and of more: those have small bounds, at a greater
+# cost.
+_RESAMPLES_OF_INDICES, _MOST_RUNS = (100, 25), 5000
 # Half width beyond which a bound of an index, a number from 0 to 1, is none.
 _WIDEST = 10.0
 ANY_CRITERION = "any of them"
 Row = dict[str, Any]
-
-
-class Bounded(NamedTuple):
-    """An estimate and the bounds of its confidence interval, NaN where there is none."""
-
-    value: float
-    low: float
-    high: float
-
-
-def student(x: np.ndarray) -> Bounded:
-    """Mean with the bounds of Student's distribution."""
-    from scipy import stats
-
-    n, value = len(x), float(np.mean(x))
-    half = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * float(np.std(x, ddof=1)) / np.sqrt(n)
-    return Bounded(value, value - half, value + half)
-
-
-def mean(x: np.ndarray) -> Bounded:
-    """Mean with bounds by the bootstrap (BCa, Efron 1987), which stay where values can be.
-
-    Of fewer than ``_FEWEST`` values, or more than ``_MOST_RESAMPLED``, by Student's
-    distribution.
-    """
-    if np.ptp(x) == 0.0 or not _FEWEST <= len(x) <= _MOST_RESAMPLED:
-        return student(x)
-    return _bootstrap(x)
-
-
-def deviation(x: np.ndarray) -> Bounded:
-    """Standard deviation s with n - 1 degrees of freedom, and its bounds.
-
-    ln(c s^2) is taken as normal, with c = n/(n - z) and the variance
-    c^2 (kurtosis - (n - 3)/n)/(n - 1); the kurtosis is that about a trimmed mean (D. Bonett,
-    Comput. Stat. Data Anal. 50, 2006, 775). Fewer than ``_FEWEST`` values have no bounds.
-    """
-    from scipy import stats
-
-    n, value = len(x), float(np.std(x, ddof=1))
-    if np.ptp(x) == 0.0:
-        return Bounded(0.0, 0.0, 0.0)
-    if n < _FEWEST:
-        return Bounded(value, np.nan, np.nan)
-    z = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE))
-    factor = n / (n - z)
-    middle = stats.trim_mean(x, 0.5 / np.sqrt(n - 4.0))
-    # Over s, so that the fourth power of small values does not underflow.
-    kurtosis = n * np.sum(((x - middle) / value) ** 4) / (n - 1.0) ** 2
-    half = z * factor * np.sqrt((kurtosis - (n - 3.0) / n) / (n - 1.0))
-    low, high = value * np.sqrt(factor) * np.exp(0.5 * half * np.array([-1.0, 1.0]))
-    return Bounded(value, float(low), float(high))
-
-
-def _bootstrap(x: np.ndarray) -> Bounded:
-    """Mean with BCa bounds; NaN where values are so alike that resamples show none.
-
-    Resamples of n values scatter by sqrt((n - 1)/n) too little and are normal where Student's
-    distribution is wider, so that intervals of 95 % would hold the truth in 87 % of ten normal
-    values. They are taken at the greater level that mends both (T. Hesterberg, Am. Stat. 69, 2015,
-    371, the expanded interval).
-    """
-    from scipy import stats
-
-    n = len(x)
-    wider = np.sqrt(n / (n - 1.0)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)
-    level = float(2.0 * stats.norm.cdf(wider) - 1.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        found = stats.bootstrap(
-            (x,),
-            np.mean,
-            n_resamples=_RESAMPLES,
-            confidence_level=level,
-            method="BCa",
-            random_state=np.random.default_rng(1),
-        ).confidence_interval
-    return Bounded(float(np.mean(x)), float(found.low), float(found.high))
-
-
-def quantile(x: np.ndarray, probability: float) -> Bounded:
-    """A quantile with bounds by order statistics, whatever the distribution.
-
-    The number of values below the quantile is binomial, so that between the values of ranks l and
-    u lies the quantile with at least the wanted confidence (David and Nagaraja 2003, sec. 7.1). A
-    bound is NaN if there are too few values for it. The ``probability`` of the quantile is in
-    (0, 1).
-    """
-    from scipy import stats
-
-    ordered, n = np.sort(x), len(x)
-    rest = 0.5 * (1.0 - CONFIDENCE)
-    lower = int(stats.binom.ppf(rest, n, probability))
-    upper = int(stats.binom.ppf(1.0 - rest, n, probability)) + 1
-    return Bounded(
-        float(np.quantile(ordered, probability)),
-        float(ordered[lower - 1]) if lower >= 1 else np.nan,
-        float(ordered[upper - 1]) if upper <= n else np.nan,
-    )
-
-
-def share(hits: int, n: int) -> Bounded:
-    """A probability from a number of hits among n, with bounds of Clopper and Pearson (1934)."""
-    from scipy import stats
-
-    # The probability of the test, which is not asked for, underflows with thousands of runs.
-    with np.errstate(all="ignore"):
-        interval = stats.binomtest(hits, n).proportion_ci(CONFIDENCE, method="exact")
-    return Bounded(hits / n, float(interval.low), float(interval.high))
-
-
-def named(name: str, one: Bounded) -> dict[str, Any]:
-    """An estimate as three cells of a row."""
-    return {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high}
-
-
-def indices(table: RunTable) -> tuple[str, list[dict[str, Any]], list[str]]:
-    """Sensitivity indices of all statistics: their method, rows, and notes on what is left out.
-
-    Rows have ``statistic``, ``pantograph``, ``key``, ``S1``, ``S1_conf`` (half width of the 95 %
-    interval, NaN if there is none) and, with Saltelli's samples, ``ST``, ``ST_conf``, or, of a
-    second-order index, ``with``, ``S2``, ``S2_conf``. ``rank_correlation`` is Spearman's.
-    """
-    sampling = table.sampling
-    if sampling is not None and sampling.method == SALTELLI:
-        return SOBOL, *_sobol(table, sampling)
-    return GIVEN_DATA, *_given_data(table)
-
-
-def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any]], list[str]]:
-    from SALib.analyze import sobol
-
-    names = [sample_name(number + 1) for number in range(sampling.n_samples)]
-    rows: list[dict[str, Any]] = []
-    notes: dict[str, None] = {}
-    for statistic in table.statistics:
-        for pantograph, own in table.of(statistic).items():
-            y = own.set_index("variant")[statistic].reindex(names).to_numpy(float)
-            blocks = y.reshape(sampling.n, sampling.block)
-            whole = blocks[np.isfinite(blocks).all(axis=1)]
-            if len(whole) < 2:
-                notes["no base sample is complete: there are no Sobol indices"] = None
-                continue
-            if len(whole) < sampling.n:
-                lost = sampling.n - len(whole)
-                notes[f"{lost} of {sampling.n} base samples are incomplete and left out"] = None
-            if np.ptp(whole) == 0.0:
-                continue  # nothing varies
-            with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # resamples without variance
-                found = sobol.analyze(
-                    problem_of(sampling.columns),
-                    whole.ravel(),
-                    calc_second_order=sampling.second_order,
-                    conf_level=CONFIDENCE,
-                    seed=_SEED,
-                )
-            here = {"statistic": statistic, "pantograph": pantograph}
-            for i, key in enumerate(sampling.columns):
-                row = {name: float(found[name][i]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
-                rows.append({**here, "key": key, **_with_bounds(row)})
-            pairs = combinations(enumerate(sampling.columns), 2) if sampling.second_order else ()
-            for (i, key), (j, other) in pairs:
-                row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
-                rows.append({**here, "key": key, "with": other, **_with_bounds(row)})
-    return rows, list(notes)
-
-
-def _with_bounds(row: dict[str, float]) -> dict[str, float]:
-    """NaN for half widths that say nothing: of resamples that hardly vary."""
-    empty = {name: np.nan for name in row if name.endswith("_conf") and row[name] > _WIDEST}
-    return row | empty
-
-
-def ranked_inputs(table: RunTable) -> list[str]:
-    """Inputs whose values have an order: numbers that are no seeds and number no realisations."""
-    sampling, done = table.sampling, table.done
-    numbers = [
-        name
-        for name in table.inputs
-        if pd.api.types.is_numeric_dtype(done[name])
-        and not pd.api.types.is_bool_dtype(done[name])
-        and done[name].nunique() > 1
-    ]
-    if sampling is None:
-        return numbers
-    return [
-        name
-        for name in numbers
-        if name in sampling.keys and not isinstance(sampling.keys[name], SeedTable | ChoicesTable)
-    ]
-
-
-def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
-    keys = ranked_inputs(table)
-    others = [name for name in table.inputs if name not in keys]
-    alike = [name for name in others if table.done[name].map(str).nunique() < 2]
-    without = [name for name in others if name not in alike]
-    notes: list[str] = []
-    if alike:
-        notes.append(f"{', '.join(alike)} without an index: no two runs differ in it")
-    if without:
-        notes.append(
-            f"{', '.join(without)} without an index: seeds, fields and choices have one with "
-            'method = "saltelli" only'
-        )
-    rows: list[dict[str, Any]] = []
-    if not keys:
-        return rows, notes
-    few = False
-    for statistic in table.statistics:
-        for pantograph, own in table.of(statistic).items():
-            known = own[own[statistic].notna()]
-            y = known[statistic].to_numpy(float)
-            if len(y) < _FEWEST_RUNS:
-                few = True
-                continue
-            if np.ptp(y) == 0.0:
-                continue
-            x = known[keys].to_numpy(float)
-            found = _rbd_fast(keys, x, y)
-            ranks = known[keys].rank().corrwith(known[statistic].rank())
-            here = {"statistic": statistic, "pantograph": pantograph}
-            for i, key in enumerate(keys):
-                row = {name: float(found[name][i]) for name in ("S1", "S1_conf")}
-                rows.append({**here, "key": key, **row, "rank_correlation": float(ranks[key])})
-    if few:
-        notes.append(f"first-order indices need at least {_FEWEST_RUNS} runs")
-    together = table.sampling.correlations if table.sampling is not None else []
-    for one in together if rows else ():
-        notes.append(f"the indices of {' and '.join(one.keys)} also hold what these share")
-    return rows, notes
-
-
-def _rbd_fast(keys: Sequence[str], x: np.ndarray, y: np.ndarray) -> Mapping[str, Any]:
-    """First-order indices of inputs (n, m), by their keys, of a statistic (n,)."""
-    from SALib.analyze import rbd_fast
-
-    # SALib seeds NumPy's global generator: it is put back as it was.
-    before = np.random.get_state()
-    try:
-        # Of a statistic that is zero in most runs all values of a resample may be the same: its
-        # index, and with it the bounds, are no numbers.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found: Mapping[str, Any] = rbd_fast.analyze(
-                problem_of(keys),
-                x,
-                y,
-                M=_HARMONICS[len(y) >= _MANY],
-                num_resamples=_RESAMPLES_OF_INDICES[len(y) > _MOST],
-                conf_level=CONFIDENCE,
-                seed=_SEED,
-            )
-    finally:
-        np.random.set_state(before)
-    return found
 
 
 @dataclass(frozen=True)
@@ -310,7 +57,7 @@ class Uncertainty:
     quantiles : of each statistic with bounds
     probabilities : that acceptance criteria fail, with bounds
     method : of the sensitivity indices
-    sensitivity : rows of ``sensitivity.indices``
+    sensitivity : rows of ``indices``
     remarks : remarks on runs, and the number of runs with each, the most frequent first
     notes : sentences on what is left out
     is_sampled : whether the inputs are known to be samples, so that shares are probabilities
@@ -433,3 +180,249 @@ def _united(lists: Iterable[Sequence[str]]) -> list[str]:
 def _probability(criterion: str, failed: int, n: int) -> Row:
     head = {"criterion": criterion, "n": n, "failed": failed}
     return {**head, **named("probability", share(failed, n))}
+
+
+class Bounded(NamedTuple):
+    """An estimate and the bounds of its confidence interval, NaN where there is none."""
+
+    value: float
+    low: float
+    high: float
+
+
+def student(x: np.ndarray) -> Bounded:
+    """Mean with the bounds of Student's distribution."""
+    n, value = len(x), float(np.mean(x))
+    half = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * float(np.std(x, ddof=1)) / np.sqrt(n)
+    return Bounded(value, value - half, value + half)
+
+
+def mean(x: np.ndarray) -> Bounded:
+    """Mean with bounds by the bootstrap (BCa, Efron 1987), which stay where values can be.
+
+    Of fewer than ``_FEWEST`` values, or more than ``_MOST_RESAMPLED``, by Student's
+    distribution.
+    """
+    if np.ptp(x) == 0.0 or not _FEWEST <= len(x) <= _MOST_RESAMPLED:
+        return student(x)
+    return _bootstrap(x)
+
+
+def deviation(x: np.ndarray) -> Bounded:
+    """Standard deviation s with n - 1 degrees of freedom, and its bounds.
+
+    ln(c s^2) is taken as normal, with c = n/(n - z) and the variance
+    c^2 (kurtosis - (n - 3)/n)/(n - 1); the kurtosis is that about a trimmed mean (D. Bonett,
+    Comput. Stat. Data Anal. 50, 2006, 775). Fewer than ``_FEWEST`` values have no bounds.
+    """
+    n, value = len(x), float(np.std(x, ddof=1))
+    if np.ptp(x) == 0.0:
+        return Bounded(0.0, 0.0, 0.0)
+    if n < _FEWEST:
+        return Bounded(value, np.nan, np.nan)
+    z = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE))
+    factor = n / (n - z)
+    middle = stats.trim_mean(x, 0.5 / np.sqrt(n - 4.0))
+    # Over s, so that the fourth power of small values does not underflow.
+    kurtosis = n * np.sum(((x - middle) / value) ** 4) / (n - 1.0) ** 2
+    half = z * factor * np.sqrt((kurtosis - (n - 3.0) / n) / (n - 1.0))
+    low, high = value * np.sqrt(factor) * np.exp(0.5 * half * np.array([-1.0, 1.0]))
+    return Bounded(value, float(low), float(high))
+
+
+def _bootstrap(x: np.ndarray) -> Bounded:
+    """Mean with BCa bounds; NaN where values are so alike that resamples show none.
+
+    Resamples of n values scatter by sqrt((n - 1)/n) too little and are normal where Student's
+    distribution is wider, so that intervals of 95 % would hold the truth in 87 % of ten normal
+    values. They are taken at the greater level that mends both (T. Hesterberg, Am. Stat. 69, 2015,
+    371, the expanded interval).
+    """
+    n = len(x)
+    wider = np.sqrt(n / (n - 1.0)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)
+    level = float(2.0 * stats.norm.cdf(wider) - 1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        found = stats.bootstrap(
+            (x,),
+            np.mean,
+            n_resamples=_RESAMPLES,
+            confidence_level=level,
+            method="BCa",
+            random_state=np.random.default_rng(_SEED),
+        ).confidence_interval
+    return Bounded(float(np.mean(x)), float(found.low), float(found.high))
+
+
+def quantile(x: np.ndarray, probability: float) -> Bounded:
+    """A quantile with bounds by order statistics, whatever the distribution.
+
+    The number of values below the quantile is binomial, so that between the values of ranks l and
+    u lies the quantile with at least the wanted confidence (David and Nagaraja 2003, sec. 7.1). A
+    bound is NaN if there are too few values for it. The ``probability`` of the quantile is in
+    (0, 1).
+    """
+    ordered, n = np.sort(x), len(x)
+    rest = 0.5 * (1.0 - CONFIDENCE)
+    lower = int(stats.binom.ppf(rest, n, probability))
+    upper = int(stats.binom.ppf(1.0 - rest, n, probability)) + 1
+    return Bounded(
+        float(np.quantile(ordered, probability)),
+        float(ordered[lower - 1]) if lower >= 1 else np.nan,
+        float(ordered[upper - 1]) if upper <= n else np.nan,
+    )
+
+
+def share(hits: int, n: int) -> Bounded:
+    """A probability from a number of hits among n, with bounds of Clopper and Pearson (1934)."""
+    # The probability of the test, which is not asked for, underflows with thousands of runs.
+    with np.errstate(all="ignore"):
+        interval = stats.binomtest(hits, n).proportion_ci(CONFIDENCE, method="exact")
+    return Bounded(hits / n, float(interval.low), float(interval.high))
+
+
+def named(name: str, one: Bounded) -> dict[str, Any]:
+    """An estimate as three cells of a row."""
+    return {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high}
+
+
+def indices(table: RunTable) -> tuple[str, list[dict[str, Any]], list[str]]:
+    """Sensitivity indices of all statistics: their method, rows, and notes on what is left out.
+
+    Rows have ``statistic``, ``pantograph``, ``key``, ``S1``, ``S1_conf`` (half width of the 95 %
+    interval, NaN if there is none) and, with Saltelli's samples, ``ST``, ``ST_conf``, or, of a
+    second-order index, ``with``, ``S2``, ``S2_conf``. ``rank_correlation`` is Spearman's.
+    """
+    sampling = table.sampling
+    if sampling is not None and sampling.method == SALTELLI:
+        return SOBOL, *_sobol(table, sampling)
+    return GIVEN_DATA, *_given_data(table)
+
+
+def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any]], list[str]]:
+    from SALib.analyze import sobol
+
+    names = [sample_name(number + 1) for number in range(sampling.n_samples)]
+    rows: list[dict[str, Any]] = []
+    notes: dict[str, None] = {}
+    for statistic in table.statistics:
+        for pantograph, own in table.of(statistic).items():
+            y = own.set_index("variant")[statistic].reindex(names).to_numpy(float)
+            blocks = y.reshape(sampling.n, sampling.block)
+            whole = blocks[np.isfinite(blocks).all(axis=1)]
+            if len(whole) < 2:
+                notes["no base sample is complete: there are no Sobol indices"] = None
+                continue
+            if len(whole) < sampling.n:
+                lost = sampling.n - len(whole)
+                notes[f"{lost} of {sampling.n} base samples are incomplete and left out"] = None
+            if np.ptp(whole) == 0.0:
+                continue  # nothing varies
+            with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # resamples without variance
+                found = sobol.analyze(
+                    salib_problem(sampling.columns),
+                    whole.ravel(),
+                    calc_second_order=sampling.second_order,
+                    conf_level=CONFIDENCE,
+                    seed=_SEED,
+                )
+            here = {"statistic": statistic, "pantograph": pantograph}
+            for i, key in enumerate(sampling.columns):
+                row = {name: float(found[name][i]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
+                rows.append({**here, "key": key, **_with_bounds(row)})
+            pairs = combinations(enumerate(sampling.columns), 2) if sampling.second_order else ()
+            for (i, key), (j, other) in pairs:
+                row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
+                rows.append({**here, "key": key, "with": other, **_with_bounds(row)})
+    return rows, list(notes)
+
+
+def _with_bounds(row: dict[str, float]) -> dict[str, float]:
+    """NaN for half widths that say nothing: of resamples that hardly vary."""
+    empty = {name: np.nan for name in row if name.endswith("_conf") and row[name] > _WIDEST}
+    return row | empty
+
+
+def ranked_inputs(table: RunTable) -> list[str]:
+    """Inputs whose values have an order: numbers that are no seeds and number no realisations."""
+    sampling, done = table.sampling, table.done
+    numbers = [
+        name
+        for name in table.inputs
+        if pd.api.types.is_numeric_dtype(done[name])
+        and not pd.api.types.is_bool_dtype(done[name])
+        and done[name].nunique() > 1
+    ]
+    if sampling is None:
+        return numbers
+    return [
+        name
+        for name in numbers
+        if name in sampling.keys and not isinstance(sampling.keys[name], SeedTable | ChoicesTable)
+    ]
+
+
+def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
+    keys = ranked_inputs(table)
+    others = [name for name in table.inputs if name not in keys]
+    alike = [name for name in others if table.done[name].map(str).nunique() < 2]
+    without = [name for name in others if name not in alike]
+    notes: list[str] = []
+    if alike:
+        notes.append(f"{', '.join(alike)} without an index: no two runs differ in it")
+    if without:
+        notes.append(
+            f"{', '.join(without)} without an index: seeds, fields and choices have one with "
+            'method = "saltelli" only'
+        )
+    rows: list[dict[str, Any]] = []
+    if not keys:
+        return rows, notes
+    few = False
+    for statistic in table.statistics:
+        for pantograph, own in table.of(statistic).items():
+            known = own[own[statistic].notna()]
+            y = known[statistic].to_numpy(float)
+            if len(y) < _FEWEST_RUNS:
+                few = True
+                continue
+            if np.ptp(y) == 0.0:
+                continue
+            x = known[keys].to_numpy(float)
+            found = _rbd_fast(keys, x, y)
+            ranks = known[keys].rank().corrwith(known[statistic].rank())
+            here = {"statistic": statistic, "pantograph": pantograph}
+            for i, key in enumerate(keys):
+                row = {name: float(found[name][i]) for name in ("S1", "S1_conf")}
+                rows.append({**here, "key": key, **row, "rank_correlation": float(ranks[key])})
+    if few:
+        notes.append(f"first-order indices need at least {_FEWEST_RUNS} runs")
+    together = table.sampling.correlations if table.sampling is not None else []
+    for one in together if rows else ():
+        notes.append(f"the indices of {' and '.join(one.keys)} also hold what these share")
+    return rows, notes
+
+
+def _rbd_fast(keys: Sequence[str], x: np.ndarray, y: np.ndarray) -> Mapping[str, Any]:
+    """First-order indices of inputs (n, m), by their keys, of a statistic (n,)."""
+    from SALib.analyze import rbd_fast
+
+    # SALib seeds NumPy's global generator: it is put back as it was.
+    before = np.random.get_state()
+    try:
+        # Of a statistic that is zero in most runs all values of a resample may be the same: its
+        # index, and with it the bounds, are no numbers.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found: Mapping[str, Any] = rbd_fast.analyze(
+                salib_problem(keys),
+                x,
+                y,
+                M=_HARMONICS[len(y) >= _MANY_RUNS],
+                num_resamples=_RESAMPLES_OF_INDICES[len(y) > _MOST_RUNS],
+                conf_level=CONFIDENCE,
+                seed=_SEED,
+            )
+    finally:
+        np.random.set_state(before)
+    return found

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
 from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory, row_of
-from catenary.meshgen.mesh import DROPPERS, LineMesh
+from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.switching_links import some_of, switching_links
@@ -271,7 +271,7 @@ class EnergyMotion:
         model, mesh = rest.model, rest.mesh
         self._nodes = np.arange(mesh.n_nodes) if nodes is None else nodes
         self._numbering = model.numbering
-        self._pieces = list(_pieces(mesh))
+        self._pieces = [piece for name in mesh.wires for piece in mesh.pieces(name)]
         self._stiffness, self._mass = (
             whole_matrix(model, **kind).tocsr() for kind in ({"stiffness": 1.0}, {"mass": 1.0})
         )
@@ -338,16 +338,6 @@ class EnergyMotion:
         unknowns, weights, law = self._links
         beyond = law["rest"] + law["stiffness"] * (weights * d[unknowns]).sum(axis=1)
         return -law["released"] * np.minimum(beyond, 0.0) ** 2 / (2.0 * law["stiffness"])
-
-
-def _pieces(mesh: LineMesh) -> list[np.ndarray]:
-    """Nodes of each piece of each wire in order of x."""
-    none = np.zeros(0, dtype=int)
-    return [
-        part
-        for name, nodes in mesh.wires.items()
-        for part in np.split(nodes, mesh.breaks.get(name, none))
-    ]
 
 
 class Arrived(NamedTuple):

@@ -293,7 +293,7 @@ def study_waves(folder: Path) -> tuple[str, list[Path]]:
     if data.excitation is not None:
         what = "force" if isinstance(data.excitation, MovingForce) else "blow"
     waves = energy.seen().within(moving)
-    return _write(folder, theory, rest, seen, waves, data.supports, what, remarks)
+    return _write_waves(folder, theory, rest, seen, waves, data.supports, what, remarks)
 
 
 def study_excited(
@@ -342,7 +342,7 @@ def study_excited(
     what = "force" if moves else "blow"
     seen = wire.seen(*course_of(excitation))
     remarks = ended.summary["remarks"]
-    return _write(folder, theory, rest, seen, energy.seen(), supports, what, remarks)
+    return _write_waves(folder, theory, rest, seen, energy.seen(), supports, what, remarks)
 
 
 def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[Path]]:
@@ -379,7 +379,7 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
     return "\n".join(lines), files
 
 
-def _write(
+def _write_waves(
     folder: Path,
     theory: WaveTheory,
     rest: LineAtRest,

@@ -406,10 +406,13 @@ def _draw_of_train(results: Results, channel: Channel) -> Figure:
             words = [f"strip {n + 1}" for n in range(len(own))] if len(own) > 1 else [word]
             shown[p] = list(zip(words, own, strict=True))
     elif channel.per == WIRE:
-        shown = {p: list(own.items()) for p, own in enumerate(results.wire_columns())}
+        shown = {
+            p: [(wire_words(name), column) for name, column in own.items()]
+            for p, own in enumerate(results.wire_columns())
+        }
     elif channel.per == CONTACT:
         for p, by_name in enumerate(results.contact_columns()):
-            shown[p] = [(name or word, column) for name, column in by_name.items()]
+            shown[p] = [(wire_words(name) or word, column) for name, column in by_name.items()]
     label, factor = _label(channel), 1.0
     columns = [column for curves in shown.values() for _, column in curves]
     if channel.unit == "m" and _largest(results, channel.name, columns) < _SMALL:
