@@ -644,7 +644,7 @@ def _statement_blocks(
 
 def _waves_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     """Motion of the contact wire in space and time, from the snapshots of the run."""
-    # Snapshots of films are read as waves are.
+    # This section alone takes snapshots of a film, and the theory of waves.
     from catenary.cases.studies.waves import pictures
     from catenary.cases.studies.waves.seen import waves_seen
     from catenary.cases.studies.waves.theory import wave_theory

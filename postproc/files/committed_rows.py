@@ -161,7 +161,7 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
         Smallest and largest values, (2, columns), by channel.
     """
     group = file.require_group(_EXTREMES)
-    counts = [_rows_of(group[slot]) if slot in group else -1 for slot in SLOTS]
+    counts = [_steps_in(group[slot]) if slot in group else -1 for slot in SLOTS]
     place = group.require_group(SLOTS[int(np.argmin(counts))])
     arrays = {**extremes, ROWS: np.array(n_rows, dtype=np.int64)}
     for name, values in arrays.items():
@@ -175,7 +175,7 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
 def drop_extremes(file: h5py.File, n_rows: int) -> None:
     """Forget extremes of more steps than a run that goes on after ``n_rows`` has shown."""
     for slot in file[_EXTREMES].values():
-        if _rows_of(slot) > n_rows + 1:
+        if _steps_in(slot) > n_rows + 1:
             slot[ROWS][...] = -1
 
 
@@ -185,7 +185,7 @@ def extremes_at(file: h5py.File, n_rows: int) -> dict[str, np.ndarray] | None:
     Those of one step more serve as well: a run that goes on from a state shows it again. Those
     whose checksum is wrong count as not kept.
     """
-    found = {_rows_of(slot): slot for slot in file.get(_EXTREMES, {}).values()}
+    found = {_steps_in(slot): slot for slot in file.get(_EXTREMES, {}).values()}
     slot = found.get(n_rows, found.get(n_rows + 1))
     if slot is None:
         return None
@@ -196,7 +196,7 @@ def extremes_at(file: h5py.File, n_rows: int) -> dict[str, np.ndarray] | None:
     return arrays
 
 
-def _rows_of(slot: h5py.Group) -> int:
+def _steps_in(slot: h5py.Group) -> int:
     """For how many steps a slot holds, -1 if that is not a single whole number."""
     rows = slot.get(ROWS)
     if not isinstance(rows, h5py.Dataset) or rows.shape != () or rows.dtype.kind not in "iu":

@@ -1,6 +1,6 @@
 """Schema of ``run.h5``, declared once: attributes, tables, their dimensions, units and bounds.
 
-``result_file`` and ``dimensions`` write by these declarations, ``read.validated_file`` reads
+``result_file`` and ``dimensions`` write by these declarations, ``read.result_tables`` reads
 against them.
 """
 

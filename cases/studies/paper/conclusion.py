@@ -51,6 +51,127 @@ _BY_READING = ("mean_N", "std_N", "std_percent", "max_N", "min_N", "loss_percent
                "slack_before", "slack_after")  # fmt: skip
 
 
+def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Study:
+    """Verdicts under each reading, the search, the ranking of inputs, and pictures.
+
+    Parameters
+    ----------
+    runs : by name, those that broke included; what was not run of the table is left out
+    draw : makes pictures of the runs of a reading that are done
+    """
+    table, statements = study.table, statements_of(study.table)
+    readings = [
+        one
+        for one in table["readings"]
+        if run_name(one["name"], study.dampings[0], study.trains[0]) in runs
+    ]
+    rows = {one["name"]: study.rows(runs, one["name"]) for one in readings}
+    found = {name: judge(statements, own) for name, own in rows.items()}
+    first, *others = readings
+    start = rows[first["name"]].only(study.trains[:1])
+    ranked = rank(start, dict(study.rows_of_variations(runs)), study)
+    named = judge(statements, rows[first["name"]].only(study.named_trains))
+    explained = []
+    for i, one in enumerate(found[first["name"]]):
+        elsewhere = {other["title"]: found[other["name"]][i] for other in others}
+        explained.append(_explained(one, named[i], elsewhere, statements[i], ranked))
+    shown = [one for one in readings if one.get("figures")]
+    judged = [
+        Reading(one["name"], one["title"], changes_of(one), found[one["name"]]) for one in readings
+    ]
+    judged[0] = replace(judged[0], findings=explained)
+    tables = [
+        _side_by_side(shown, found),
+        search_table(study, statements, _searched(study, runs)),
+        *(_table_of(one, rows[one["name"]]) for one in readings),
+        separation_table(study, _bands(study, runs, readings, rows)),
+        ranking_table(study, ranked),
+    ]
+    pictures = _drawn(study, runs, shown, rows, draw)
+    return Study(table["title"], table["lead"], judged, tables, pictures)
+
+
+def _drawn(
+    study: PaperStudy,
+    runs: Mapping[str, StudyRun],
+    shown: Sequence[Mapping[str, Any]],
+    rows: Mapping[str, Rows],
+    draw: Draw,
+) -> list[StudyFigure]:
+    """The pictures of all readings that are to be shown, beside each other."""
+    drawn: list[tuple[str, StudyFigure]] = []
+    for number, reading in enumerate(shown):
+        folders = {
+            damping: {
+                train: run.folder
+                for train in study.trains
+                if (run := runs.get(run_name(reading["name"], damping, train))) is not None
+                and run.ended.done
+            }
+            for damping in study.dampings
+        }
+        for one in draw(folders, rows[reading["name"]]):
+            renamed = replace(
+                one,
+                name=f"{one.name}_{reading['name']}",
+                caption=f"{one.caption[:-1]}: {reading['title']}.",
+            )
+            drawn.append((one.name, renamed if number else one))
+    return [one for _, one in sorted(drawn, key=lambda pair: pair[0])]
+
+
+def _explained(
+    finding: Finding,
+    named: Finding,
+    others: Mapping[str, Finding],
+    statement: Statement,
+    ranked: Sequence[Ranked],
+) -> Finding:
+    """The finding with the reason that the runs give where it differs from the paper."""
+    if finding.verdict != NOT_REPRODUCED:
+        return finding
+    parts = []
+    if named.found != finding.found:
+        parts.append(
+            f"With only the separations that the text names: {named.verdict} ({named.found})."
+        )
+    met = {title: one for title, one in others.items() if one.verdict == REPRODUCED}
+    parts += [f"Reproduced with {title}: {one.found}." for title, one in met.items()]
+    if others and not met:
+        parts.append(f"None of the {len(others)} other readings reproduces it.")
+    return replace(finding, reason=" ".join([*parts, movers(statement, ranked)]).strip())
+
+
+def _side_by_side(
+    readings: Sequence[Mapping[str, Any]], found: Mapping[str, Sequence[Finding]]
+) -> StudyTable:
+    """All statements under some readings, each with its figures."""
+    columns = [found[one["name"]] for one in readings]
+    met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
+    notes = [
+        f"{reading['title']}: {n} of {len(column)} reproduced"
+        for reading, n, column in zip(readings, met, columns, strict=True)
+    ]
+    heads = ["no.", "statement", *(reading["title"] for reading in readings)]
+    rows = [
+        [one[0].number, one[0].statement, *(f"{own.verdict}: {own.found}" for own in one)]
+        for one in zip(*columns, strict=True)
+    ]
+    title = "The statements beside each other"
+    return texts_table(heads, rows, title=title, note=f"{'; '.join(notes)}.")
+
+
+def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:
+    """All pantographs of a reading."""
+    changes = " ".join(changes_of(reading))
+    broke = [{**run, "place": "", "outcome": "there is no such run"} for run in rows.missing]
+    columns = [Column(name, name) for name in ("train", "damping")]
+    columns += [Column("place", "pantograph"), *(FIGURES[name] for name in _BY_READING)]
+    title = f"All configurations: {reading['title']}"
+    note = f"Changes: {changes}." if changes else "No changes."
+    return StudyTable(columns, [*rows.rows, *broke], title, note)
+
+
 class Condition(Table):
     """A condition on a figure of all pantographs, or runs, with the words of ``where``.
 
@@ -235,127 +356,6 @@ class Ranked(NamedTuple):
 
     title: str
     rows: Rows
-
-
-def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Study:
-    """Verdicts under each reading, the search, the ranking of inputs, and pictures.
-
-    Parameters
-    ----------
-    runs : by name, those that broke included; what was not run of the table is left out
-    draw : makes pictures of the runs of a reading that are done
-    """
-    table, statements = study.table, statements_of(study.table)
-    readings = [
-        one
-        for one in table["readings"]
-        if run_name(one["name"], study.dampings[0], study.trains[0]) in runs
-    ]
-    rows = {one["name"]: study.rows(runs, one["name"]) for one in readings}
-    found = {name: judge(statements, own) for name, own in rows.items()}
-    first, *others = readings
-    start = rows[first["name"]].only(study.trains[:1])
-    ranked = rank(start, dict(study.rows_of_variations(runs)), study)
-    named = judge(statements, rows[first["name"]].only(study.named_trains))
-    explained = []
-    for i, one in enumerate(found[first["name"]]):
-        elsewhere = {other["title"]: found[other["name"]][i] for other in others}
-        explained.append(_explained(one, named[i], elsewhere, statements[i], ranked))
-    shown = [one for one in readings if one.get("figures")]
-    judged = [
-        Reading(one["name"], one["title"], changes_of(one), found[one["name"]]) for one in readings
-    ]
-    judged[0] = replace(judged[0], findings=explained)
-    tables = [
-        _side_by_side(shown, found),
-        search_table(study, statements, _searched(study, runs)),
-        *(_table_of(one, rows[one["name"]]) for one in readings),
-        separation_table(study, _bands(study, runs, readings, rows)),
-        ranking_table(study, ranked),
-    ]
-    pictures = _drawn(study, runs, shown, rows, draw)
-    return Study(table["title"], table["lead"], judged, tables, pictures)
-
-
-def _drawn(
-    study: PaperStudy,
-    runs: Mapping[str, StudyRun],
-    shown: Sequence[Mapping[str, Any]],
-    rows: Mapping[str, Rows],
-    draw: Draw,
-) -> list[StudyFigure]:
-    """The pictures of all readings that are to be shown, beside each other."""
-    drawn: list[tuple[str, StudyFigure]] = []
-    for number, reading in enumerate(shown):
-        folders = {
-            damping: {
-                train: run.folder
-                for train in study.trains
-                if (run := runs.get(run_name(reading["name"], damping, train))) is not None
-                and run.ended.done
-            }
-            for damping in study.dampings
-        }
-        for one in draw(folders, rows[reading["name"]]):
-            renamed = replace(
-                one,
-                name=f"{one.name}_{reading['name']}",
-                caption=f"{one.caption[:-1]}: {reading['title']}.",
-            )
-            drawn.append((one.name, renamed if number else one))
-    return [one for _, one in sorted(drawn, key=lambda pair: pair[0])]
-
-
-def _explained(
-    finding: Finding,
-    named: Finding,
-    others: Mapping[str, Finding],
-    statement: Statement,
-    ranked: Sequence[Ranked],
-) -> Finding:
-    """The finding with the reason that the runs give where it differs from the paper."""
-    if finding.verdict != NOT_REPRODUCED:
-        return finding
-    parts = []
-    if named.found != finding.found:
-        parts.append(
-            f"With only the separations that the text names: {named.verdict} ({named.found})."
-        )
-    met = {title: one for title, one in others.items() if one.verdict == REPRODUCED}
-    parts += [f"Reproduced with {title}: {one.found}." for title, one in met.items()]
-    if others and not met:
-        parts.append(f"None of the {len(others)} other readings reproduces it.")
-    return replace(finding, reason=" ".join([*parts, movers(statement, ranked)]).strip())
-
-
-def _side_by_side(
-    readings: Sequence[Mapping[str, Any]], found: Mapping[str, Sequence[Finding]]
-) -> StudyTable:
-    """All statements under some readings, each with its figures."""
-    columns = [found[one["name"]] for one in readings]
-    met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
-    notes = [
-        f"{reading['title']}: {n} of {len(column)} reproduced"
-        for reading, n, column in zip(readings, met, columns, strict=True)
-    ]
-    heads = ["no.", "statement", *(reading["title"] for reading in readings)]
-    rows = [
-        [one[0].number, one[0].statement, *(f"{own.verdict}: {own.found}" for own in one)]
-        for one in zip(*columns, strict=True)
-    ]
-    title = "The statements beside each other"
-    return texts_table(heads, rows, title=title, note=f"{'; '.join(notes)}.")
-
-
-def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:
-    """All pantographs of a reading."""
-    changes = " ".join(changes_of(reading))
-    broke = [{**run, "place": "", "outcome": "there is no such run"} for run in rows.missing]
-    columns = [Column(name, name) for name in ("train", "damping")]
-    columns += [Column("place", "pantograph"), *(FIGURES[name] for name in _BY_READING)]
-    title = f"All configurations: {reading['title']}"
-    note = f"Changes: {changes}." if changes else "No changes."
-    return StudyTable(columns, [*rows.rows, *broke], title, note)
 
 
 def _searched(study: PaperStudy, runs: Mapping[str, StudyRun]) -> dict[str, Rows]:

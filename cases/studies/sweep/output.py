@@ -19,7 +19,7 @@ from catenary.cases.scene.keys.keys import ANY
 from catenary.cases.scene.keys.units import unit_of, without_unit
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, statistics_of
 from catenary.cases.studies.sweep.sweep import RECORD
-from catenary.cases.studies.sweep.variants import Variant
+from catenary.cases.studies.sweep.variants import Variant, is_number
 from catenary.cases.terminal.lists import Key, keys_of_a_scene
 from catenary.cases.terminal.terminal_text import labelled
 from catenary.postproc.evaluate.statistics import HISTOGRAM_BIN
@@ -187,7 +187,8 @@ def draw_statistics(
     plotted : names out of ``STATISTICS``
     """
     done = [row for row in table if row["outcome"] == "done"]
-    key = next((k for k in keys if all(_is_number(row[k]) for row in done)), None)
+    numbers = (k for k in keys if all(is_number(row[k]) and np.isfinite(row[k]) for row in done))
+    key = next(numbers, None)
     axis = key or (keys[0] if keys else "variant")
     others = [k for k in keys if k != axis]
     curves: dict[str, list[Mapping[str, Any]]] = {}
@@ -212,11 +213,6 @@ def draw_statistics(
         panels[-1].set_xticks(range(len(places)), places, rotation=30, ha="right")
     panels[-1].set_xlabel(key_in_words(axis))
     return figure
-
-
-def _is_number(value: Any) -> bool:
-    real = isinstance(value, int | float) and not isinstance(value, bool)
-    return real and bool(np.isfinite(value))
 
 
 def key_in_words(key: str) -> str:
@@ -247,6 +243,11 @@ def _known(key: str) -> Key | None:
         ):
             return one
     return None
+
+
+def _spaced(name: str) -> str:
+    """A name as it is written in code, without its unit and with spaces."""
+    return without_unit(name).replace("_", " ")
 
 
 def force_histograms(ended: Sequence[Ended]) -> pd.DataFrame | None:
@@ -304,8 +305,3 @@ def draw_histograms(found: pd.DataFrame) -> Figure:
     axes.set_title("line: mean of all variants, band: 5 to 95 % of them", loc="left")
     figures.legend_above(axes)
     return figure
-
-
-def _spaced(name: str) -> str:
-    """A name as it is written in code, without its unit and with spaces."""
-    return without_unit(name).replace("_", " ")

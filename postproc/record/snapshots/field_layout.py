@@ -45,7 +45,7 @@ class FieldRecord:
     Attributes
     ----------
     fields : names of `contents.FIELDS`
-    parts : names of wires and `blocks.OTHER_PARTS`, None for all
+    parts : names of wires and `contents.OTHER_PARTS`, None for all
     stretch : from and to along the track [m], None for the whole line
     window : how far behind the last and ahead of the first pantograph [m], None for everything
     course : of the train, for the window

@@ -1,4 +1,4 @@
-"""Figures of matplotlib in one style: made empty, labelled, and turned into PNG.
+"""Figures of matplotlib in one style: made empty, labelled, and turned into PNG or SVG.
 
 Nothing here needs a display or touches files. A user's ``matplotlibrc`` changes no picture. Long
 curves are thinned so that every peak stays visible.
