@@ -114,7 +114,7 @@ def arrivals(line: WaveLine, course: Course) -> Arrivals:
         run_in / line.span,
         start_share(line, course.speed, run_in),
         _within(from_far_end(line, course), course),
-        _within(from_near_end(line, course), course),
+        _within(_from_near_end(line, course), course),
         far_share(line, course),
     )
 
@@ -134,7 +134,7 @@ def from_far_end(line: WaveLine, course: Course) -> Meeting | None:
     return Meeting(course.start + course.speed * time, time)
 
 
-def from_near_end(line: WaveLine, course: Course) -> Meeting | None:
+def _from_near_end(line: WaveLine, course: Course) -> Meeting | None:
     """The first wave that the near end reflects and that catches up from behind: c t = x_rear + x +
     v t, from the near end; None if the train is as fast."""
     if course.speed >= line.speed:
@@ -202,7 +202,7 @@ def end_sentences(problem: Problem) -> tuple[str, str]:
     return start, end
 
 
-def end_warnings(problem: Problem) -> list[str]:
+def _end_warnings(problem: Problem) -> list[str]:
     """Sentences on how the ends of the line may spoil a run."""
     line, train = problem.line, problem.train
     masts, n = line.support_positions, line.n_spans
@@ -270,7 +270,7 @@ def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
         ],
         "ends": list(end_sentences(problem)),
         "warnings": [
-            *end_warnings(problem),
+            *_end_warnings(problem),
             *_reflections(scene, traced),
             *_short_run_in(problem, traced),
             *_short_stretch(problem, traced),

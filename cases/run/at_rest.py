@@ -81,7 +81,7 @@ def check_line(scene: Scene) -> Checked:
     model, form = stable_form(problem, mesh)
     refuse_lost_wire(model, form)
     waves = arrival_facts(scene, problem)
-    arms = registration_of(mesh, form)
+    arms = _registration_of(mesh, form)
     sentences = [
         f"{scene.case.name} is valid: {counted(problem.line.n_spans, 'span')}, "
         f"{problem.line.support_positions[-1]:g} m, {counted(mesh.droppers.shape[0], 'dropper')}, "
@@ -112,18 +112,10 @@ def _at_stops(model: Model) -> list[str]:
     ]
 
 
-def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:
-    """Names of the wires that droppers join, and lengths of wires between clamps.
-
-    Parameters
-    ----------
-    height : (n_nodes,) of the line at rest [m]
-
-    Returns
-    -------
-    ``line/dropper_upper``, ``line/dropper_lower`` : (n_droppers,) names of wires
-    ``static/lengths/NAME`` : length along each piece of a wire whose ends are clamped [m]
-    """
+def _installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:
+    """Names of the wires that droppers join, ``line/dropper_upper`` and ``line/dropper_lower``
+    (n_droppers,), and lengths along each piece of a wire whose ends are clamped,
+    ``static/lengths/NAME`` [m], of a line at rest with ``height`` (n_nodes,) [m]."""
     group = mesh.dropper_group
     ends = (
         ("upper", [own.upper for own in line.droppers]),
@@ -141,7 +133,7 @@ def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.nd
     return found
 
 
-def registration_of(mesh: LineMesh, form: Equilibrium) -> Registration | None:
+def _registration_of(mesh: LineMesh, form: Equilibrium) -> Registration | None:
     """Steady arms at rest, None if wires do not move sideways, so that nothing pushes an arm."""
     if form.lateral is None:
         return None
@@ -150,7 +142,7 @@ def registration_of(mesh: LineMesh, form: Equilibrium) -> Registration | None:
 
 
 def static_table(scene: Scene) -> dict[str, np.ndarray]:
-    """The line at rest, arrays named as in the result file's groups, and what `installed` adds.
+    """The line at rest, arrays named as in the result file's groups, and what `_installed` adds.
 
     Not collective.
     """
@@ -163,7 +155,7 @@ def static_table(scene: Scene) -> dict[str, np.ndarray]:
         **static_datasets(rest.problem.line, mesh, rest.form, rest.lift),
         "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
         "line/arm_x": mesh.x(mesh.steady_arms),
-        **installed(problem.line, mesh, rest.form.height),
+        **_installed(problem.line, mesh, rest.form.height),
     }
     return {name.split("/", 1)[1]: values for name, values in data.items()}
 

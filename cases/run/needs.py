@@ -121,7 +121,7 @@ class NeedsOfRuns(NamedTuple):
     memory: float
 
 
-def needs_of(
+def _needs_of(
     scene: Scene,
     problem: Problem,
     extent: Extent,
@@ -129,16 +129,10 @@ def needs_of(
     stations: Mapping[int, int] | None = None,
     slow_path: SlowPath | None = None,
 ) -> Needs:
-    """Needs of a run of a scene. Not collective.
+    """Needs of a run of a scene whose line has ``n_dofs`` unknowns.
 
-    Parameters
-    ----------
-    problem : of the scene
-    extent : of its mesh
-    n_dofs : unknowns of the line
-    stations : how many have each number of unknowns; by default all have a node of each wire that
-        has unknowns of its own
-    slow_path : why steps take longer than they could
+    ``stations`` says how many have each number of unknowns; by default all have a node of each wire
+    that has unknowns of its own. ``slow_path`` is why steps take longer than they could.
     """
     active = effects.active(problem)
     if not stations:
@@ -158,7 +152,7 @@ def needs_of(
         # Substeps are counted by themselves.
         march=(1.0 if slow_path is None or n_substeps else slow_path.factor)
         * estimate_march(n_moving, n_steps, scheme, n_substeps, stations, gusts),
-        files=estimate_files(scene, problem, recording, n_dofs, flush_every),
+        files=_estimate_files(scene, problem, recording, n_dofs, flush_every),
         recording=recording,
         slow_path=slow_path,
     )
@@ -187,7 +181,7 @@ def needs_before_meshing(scene: Scene, problem: Problem | None = None) -> Needs 
         return None
     problem = problem or problem_of(scene)
     extent = extent_before_meshing(problem.line, size.nodes)
-    return needs_of(scene, problem, extent, size.unknowns)
+    return _needs_of(scene, problem, extent, size.unknowns)
 
 
 def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
@@ -201,7 +195,7 @@ def needs_with_mesh(scene: Scene, mesh: LineMesh) -> Needs:
         numbering.station_types, np.bincount(numbering.station_type), strict=True
     ):
         stations[len(places)] += int(count)
-    return needs_of(scene, problem, extent, numbering.n_unknowns, stations, slow_path)
+    return _needs_of(scene, problem, extent, numbering.n_unknowns, stations, slow_path)
 
 
 def run_size(needs: Needs) -> RunSize:
@@ -308,17 +302,11 @@ class FileSizes:
         return self.result + self.film + self.report
 
 
-def estimate_files(
+def _estimate_files(
     scene: Scene, problem: Problem, recording: Recording, n_dofs: int, flush_every: int
 ) -> FileSizes:
-    """Sizes of the files of a run. Not collective.
-
-    Parameters
-    ----------
-    recording : of the run
-    n_dofs : unknowns of the line
-    flush_every : steps between two flushes
-    """
+    """Sizes of the files of a run of a line of ``n_dofs`` unknowns, with so many steps between two
+    flushes."""
     tables = _tables(problem, recording)
     shapes = chunks_of(tables, recording.n_steps, flush_every, recording.line.every)
     rows = sum(

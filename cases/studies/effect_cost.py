@@ -498,7 +498,7 @@ class Change(NamedTuple):
     share: float
 
 
-def changes(found: Costs, row: Measured) -> list[Change]:
+def _changes(found: Costs, row: Measured) -> list[Change]:
     """Changes of all figures of all pantographs by the switch of a ``row``; unknown figures are
     left out."""
     result = []
@@ -521,9 +521,9 @@ def _share(before: dict[str, Any], after: dict[str, Any], name: str) -> float | 
     return float((b - a) / abs(of))
 
 
-def largest(found: Costs, row: Measured) -> Change | None:
+def _largest(found: Costs, row: Measured) -> Change | None:
     """The largest change by the switch of a ``row``, None without figures."""
-    return max(changes(found, row), key=lambda change: abs(change.share), default=None)
+    return max(_changes(found, row), key=lambda change: abs(change.share), default=None)
 
 
 def advice(found: Costs, row: Measured) -> str:
@@ -531,7 +531,7 @@ def advice(found: Costs, row: Measured) -> str:
     verb = "leave it out" if row.switch.on else "switch it on"
     if not row.done:
         return f"it was not measured, for you cannot {verb} here: {row.outcome.rstrip('.')}."
-    change = largest(found, row)
+    change = _largest(found, row)
     if change is None:
         return f"it {_price(row.cost)}; the stretch gives no figures to compare."
     what = _words(found, change)
@@ -591,7 +591,7 @@ def as_text(found: Costs, *, whole: bool = False) -> str:
         lines.append(f"Forces are those of {found.names[0]}, which leads.")
     lines += ["", leading.text(whole=whole), "", "Advice:"]
     width = max(len(row.switch.name) for row in found.rows) if found.rows else 0
-    lines += [f"  {row.switch.name:{width}}  {sentence(found, row)}" for row in found.rows]
+    lines += [f"  {row.switch.name:{width}}  {_sentence(found, row)}" for row in found.rows]
     remarks = remark_lines((_run(one), one.remarks) for one in (found.as_it_is, *found.rows))
     lines += ["", *remarks] if remarks else []
     if found.options.only:
@@ -645,7 +645,7 @@ def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
         "cost": None if not (switch.name and one.done) else one.cost,
         "from_m": found.stretch[0],
         "to_m": found.stretch[1],
-        "advice": sentence(found, one) if switch.name else "",
+        "advice": _sentence(found, one) if switch.name else "",
         "remarks": one.remarks,
     }
     rows = []
@@ -669,7 +669,7 @@ def _run(row: Measured) -> str:
     return f"{'without' if row.switch.on else 'with'} {row.switch.name}"
 
 
-def sentence(found: Costs, row: Measured) -> str:
+def _sentence(found: Costs, row: Measured) -> str:
     """The advice on the effect of a ``row``, and the effects that are switched with it."""
     text = advice(found, row)
     if not row.switch.together:

@@ -388,7 +388,7 @@ def _spaced(name: str) -> str:
     return name.replace("_", " ")
 
 
-def pantographs_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
+def _pantographs_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     """Each kind of pantograph of the train: its data, and the pantograph drawn to scale."""
     kinds: dict[str, tuple[Placement, str]] = {}
     words = header_words(scene.scene, scene.problem)
@@ -464,13 +464,9 @@ def _draw_pantograph(data: Any) -> Figure:
     return figure
 
 
-def worst_section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
-    """The worst places of the evaluated stretch.
-
-    Parameters
-    ----------
-    scene : of the run, for the elasticity of its line and its gusts; None if it is not known
-    """
+def _worst_section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
+    """The worst places of the evaluated stretch; without a scene nothing is known of the elasticity
+    of the line and of gusts."""
     results, places = run.results, worst_places(run.results)
     causes = Causes(results, places.passages, None if scene is None else scene.at_rest)
     return Section(
@@ -611,7 +607,7 @@ def statement_in(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path} is no record of `catenary validate`: it is incomplete") from error
 
 
-def validation_section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:
+def _validation_section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:
     """Validation of the program that made a run, by what ``statement_in`` found; None if no
     statement is at hand."""
     if statement is None:
@@ -684,10 +680,10 @@ def full_sections(
     ----------
     scene : of the run; None leaves out what needs it
     costs : of its effects, as ``run_facts.effects`` takes them
-    statement : of the installation, as ``validation_section`` takes it
+    statement : of the installation, as ``_validation_section`` takes it
     """
     effects = SectionEntry("effects", partial(run_facts.effects, costs=costs))
-    worst = partial(worst_section, scene)
+    worst = partial(_worst_section, scene)
     behind = {"motion": [SectionEntry("worst", worst, dynamics.has_statistics, full=True)]}
     text = None
     if scene is not None:
@@ -695,9 +691,9 @@ def full_sections(
         behind["spectrum"] = [SectionEntry("waves", partial(_waves_section, scene), full=True)]
         behind["rest"] = [SectionEntry("line", partial(line_section, scene), full=True)]
         if scene.has_train:
-            sheet = partial(pantographs_section, scene)
+            sheet = partial(_pantographs_section, scene)
             behind["above"] = [SectionEntry("pantographs", sheet, full=True)]
-    behind["run"] = [SectionEntry("validation", partial(validation_section, statement), full=True)]
+    behind["run"] = [SectionEntry("validation", partial(_validation_section, statement), full=True)]
     last = SectionEntry("signatures", partial(run_facts.signatures, text), full=True)
     return [
         *(

@@ -136,7 +136,7 @@ def _rows_to_keep(file: h5py.File, time: float) -> list[int]:
 
 def cut(file: h5py.File, time: float) -> None:
     """Drop the records of a file from ``time`` [s] on, and what was derived from all of them."""
-    drop_filtered(file)
+    _drop_filtered(file)
     for keep, paths in zip(_rows_to_keep(file, time), _tables_by_clock(file), strict=True):
         for path in paths:
             lost = shorten(file, path, keep)
@@ -243,7 +243,7 @@ def store_filtered(file: h5py.File, force: ForceFilter, dt: float) -> None:
     describe_filtered(table)
 
 
-def drop_filtered(file: h5py.File) -> None:
+def _drop_filtered(file: h5py.File) -> None:
     """Forget the filtered force of a run that goes on."""
     group = FILTERED_FORCE.split("/")[0]
     if group in file:

@@ -189,7 +189,7 @@ def _sum_of(value: Any) -> int:
 
 def seal_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
     """Store one checksum of the arrays of a group, ``arrays`` by name."""
-    set_attribute(group, ARRAYS_SUM, sum_of_arrays(arrays))
+    set_attribute(group, ARRAYS_SUM, _sum_of_arrays(arrays))
 
 
 def put_sealed_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
@@ -203,7 +203,7 @@ def put_sealed_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
     set_attribute(group, ARRAYS_SUM, total)
 
 
-def sum_of_arrays(arrays: Mapping[str, Any]) -> int:
+def _sum_of_arrays(arrays: Mapping[str, Any]) -> int:
     """CRC-32 of arrays with their names, in order of the names."""
     total = 0
     for name in sorted(arrays):
@@ -224,7 +224,7 @@ def sum_is_kept(group: h5py.Group, arrays: Mapping[str, Any]) -> bool | None:
     known = group.attrs.get(ARRAYS_SUM)
     if known is None:
         return None
-    return np.ndim(known) == 0 and bool(known == sum_of_arrays(arrays))
+    return np.ndim(known) == 0 and bool(known == _sum_of_arrays(arrays))
 
 
 def create_checked(file: h5py.Group, path: str, values: Any) -> h5py.Dataset:
@@ -253,7 +253,7 @@ def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:
     OSError, RuntimeError
         If HDF5 cannot open the file, or not list its tables.
     """
-    refuse_irregular(path)
+    _refuse_irregular(path)
     file = h5py.File(path, mode, **options)
     try:
         fault = _leads_elsewhere(file)
@@ -267,7 +267,7 @@ def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:
     return file
 
 
-def refuse_irregular(path: Path) -> None:
+def _refuse_irregular(path: Path) -> None:
     """Raise InputError if a path names a link, pipe, device or folder; OSError if nothing."""
     kind = stat.S_IFMT(os.lstat(path).st_mode)
     if kind != stat.S_IFREG:

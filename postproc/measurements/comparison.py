@@ -141,7 +141,7 @@ class _Comparing:
             self._find("missing pantograph", name, text)
             return
         expected = run.below(passage.cut_off)(run.position)
-        if other := other_scale(force, expected):
+        if other := _other_scale(force, expected):
             self._find(other[0], name, f"{name}: {other[1]}", float(np.mean(force)))
             return
         if np.median(force) < _NO_FORCE * float(np.mean(expected)):
@@ -170,7 +170,7 @@ class _Comparing:
             )
         aligned = self._placed(own, place, force)
         if aligned is not None:
-            self._found.findings += errors_of(aligned, name, run, passage, own.bias)
+            self._found.findings += _errors_of(aligned, name, run, passage, own.bias)
             if aligned.other_shifts:
                 shifts = ", ".join(f"{shift:+.1f}" for shift in aligned.other_shifts[:4])
                 self._found.remarks.append(f"{name}: shifts of {shifts} m fit as well")
@@ -445,24 +445,11 @@ def _near_samples(position: np.ndarray, at: np.ndarray) -> np.ndarray:
     return np.asarray((position >= at[0]) & (position <= at[-1]) & near)
 
 
-def errors_of(
+def _errors_of(
     found: Alignment, name: str, run: RunForce, passage: Passage, bias: float
 ) -> Iterator[Finding]:
-    """Errors of positions, of the force, and of the description's filter. Not collective.
-
-    Parameters
-    ----------
-    found : Alignment
-        Alignment of the measured force.
-    name : str
-        Name of the pantograph.
-    run : RunForce
-        Its force in the run.
-    passage : Passage
-        The measured passage.
-    bias : float
-        Stated deviation of a constant error of the force [N].
-    """
+    """Errors of positions, of the force, and of the description's filter; ``bias`` is the stated
+    deviation of a constant error of the force [N]."""
     if found.shift.differs(0.0, _SHIFT):
         shift, way = found.shift, "far along the track" if found.shift.value > 0 else "far back"
         by = f"{abs(shift.value):.2f} m too {way} (+- {shift.deviation:.2g} m)"
@@ -503,16 +490,9 @@ def errors_of(
         yield Finding("filter", name, text, float(value))
 
 
-def other_scale(force: np.ndarray, expected: np.ndarray) -> tuple[str, str] | None:
-    """Kind of the error and a sentence, if a force has another sign or unit than that of the run.
-
-    Parameters
-    ----------
-    force : ndarray, shape (n,)
-        Measured force [N].
-    expected : ndarray, shape (m,)
-        Force of the run in the same band [N].
-    """
+def _other_scale(force: np.ndarray, expected: np.ndarray) -> tuple[str, str] | None:
+    """Kind of the error and a sentence, if a measured force (n,) has another sign or unit than that
+    of the run in the same band, ``expected`` (m,) [N]."""
     mean, run = float(np.mean(force)), float(np.mean(expected))
     spread = float(np.std(force)), float(np.std(expected))
     if not (run > 0.0 and spread[1] > 0.0):

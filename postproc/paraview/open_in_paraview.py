@@ -95,7 +95,7 @@ def write_script(
                 raise InputError(f"{target} is a link, through which nothing is written; remove it")
             try:
                 target.mkdir(exist_ok=True)
-                files = write_beside_line(scenery, snapshots, target)
+                files = _write_beside_line(scenery, snapshots, target)
                 settings = _settings(target, scenery, snapshots, motion, look or scenery.best_view)
                 write_whole(
                     target / SCRIPT,
@@ -159,27 +159,9 @@ def _settings(
     }  # fmt: skip
 
 
-def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
-    """Write the parts beside the line at the times of the snapshots. Not collective.
-
-    Parameters
-    ----------
-    scenery : Scenery
-        Scenery of the run.
-    snapshots : Snapshots
-        Snapshots of the line.
-    folder : Path
-        Existing folder to which the files go.
-
-    Returns
-    -------
-    The XDMF file of each part by its name.
-
-    Raises
-    ------
-    OSError
-        If they cannot be written.
-    """
+def _write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
+    """Write the parts beside the line at the times of the snapshots into an existing folder;
+    returns the XDMF file of each by its name. OSError if they cannot be written."""
     data, grids = scenery.data, {name: list[str]() for name in scenery.parts}
     # In memory: HDF5 crashes the interpreter at its end where a disk has refused a write.
     with h5py.File(_NUMBERS, "w", driver="core", backing_store=False) as file:

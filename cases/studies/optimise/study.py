@@ -138,7 +138,7 @@ def make_plan(draft: Draft, task: OptimiseTask) -> Plan:
                 raise InputError(
                     f"search.values give {key}, which variables.{number} vary; leave it out"
                 )
-    checks = {name: _of_any_values(own) for name, own in checks_of(draft, task).items()}
+    checks = {name: _of_any_values(own) for name, own in _checks_of(draft, task).items()}
     warnings = []
     if is_shortened:
         warnings.append(
@@ -247,7 +247,7 @@ def _optimum_by(
     shipped = problem.shipped
     values = variables.values(found.change)
     say(f"{method}: {shipped.value:.4g} to {found.value:.4g} in {n_runs} runs; checks")
-    rows = compare(plan.checks, task.set.directions, variables.shipped, values, evaluation)
+    rows = _compare(plan.checks, task.set.directions, variables.shipped, values, evaluation)
     droppers = _dropper_lengths(plan, values)
     whole = bool(np.array_equal(variables.rounded(found.change), found.change))
     beyond = problem.beyond(found)
@@ -297,16 +297,9 @@ class Row(NamedTuple):
     outcome: str = "done"
 
 
-def checks_of(draft: Draft, task: OptimiseTask) -> dict[str, SceneSet]:
-    """Scenes under which designs are compared, by the names of checks of a task.
-
-    They are on the whole stretch of the case and in both directions.
-
-    Raises
-    ------
-    InputError
-        If a scene of them is wrong.
-    """
+def _checks_of(draft: Draft, task: OptimiseTask) -> dict[str, SceneSet]:
+    """Scenes under which designs are compared, by the names of checks of a task: on the whole
+    stretch of the case and in both directions. InputError if one of them is wrong."""
     both = task.set.model_copy(update={"directions": list(DIRECTIONS)})
     scene = draft.scene()
     numerics: dict[str, list[tuple[str, Any, str]]] = {
@@ -346,22 +339,15 @@ def _unseen(task: OptimiseTask) -> ErrorSamples:
     return ErrorSamples(dropper_lengths_mm=deviation, seeds=seeds)
 
 
-def compare(
+def _compare(
     checks: Mapping[str, SceneSet],
     searched: Sequence[str],
     shipped: Mapping[str, Any],
     optimum: Mapping[str, Any],
     evaluation: Evaluation,
 ) -> list[Row]:
-    """All figures of two designs. Not collective; all runs are made together.
-
-    Parameters
-    ----------
-    checks : scenes in which the designs are compared, by name
-    searched : directions that the search has seen
-    shipped, optimum : the two designs, as values by dotted keys
-    evaluation : runs the scenes
-    """
+    """All figures of two designs, given as values by dotted keys; all runs are made together.
+    ``searched`` are the directions that the search has seen."""
     places = [(name, member) for name, scenes in checks.items() for member in scenes.members]
     wanted: list[Wanted] = [
         (checks[name], member, values) for values in (shipped, optimum) for name, member in places

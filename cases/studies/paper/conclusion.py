@@ -82,7 +82,7 @@ def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Stu
     judged[0] = replace(judged[0], findings=explained)
     tables = [
         _side_by_side(shown, found),
-        search_table(study, statements, _searched(study, runs)),
+        _search_table(study, statements, _searched(study, runs)),
         *(_table_of(one, rows[one["name"]]) for one in readings),
         separation_table(study, _bands(study, runs, readings, rows)),
         ranking_table(study, ranked),
@@ -265,13 +265,13 @@ def judge(statements: Sequence[Statement], rows: Rows) -> list[Finding]:
     return findings
 
 
-def holds_alone(statement: Statement, rows: Rows) -> bool:
+def _holds_alone(statement: Statement, rows: Rows) -> bool:
     """Whether a single pantograph meets a statement, as far as it is about one."""
     there = [one for one in statement.conditions if _selected(one, rows)]
     return all(_judged(one, rows).holds for one in there)
 
 
-def n_met(statement: Statement, rows: Rows) -> tuple[int, int]:
+def _n_met(statement: Statement, rows: Rows) -> tuple[int, int]:
     """Number of pantographs that keep the bounds of a statement's conditions, and of all."""
     kept = [
         one.met_by(row[one.figure])
@@ -367,7 +367,7 @@ def _searched(study: PaperStudy, runs: Mapping[str, StudyRun]) -> dict[str, Rows
     return {title: rows for title, rows in found.items() if rows.rows or rows.missing}
 
 
-def search_table(
+def _search_table(
     study: PaperStudy, statements: Sequence[Statement], searched: Mapping[str, Rows]
 ) -> StudyTable:
     """The readings of a search, the best first: by statements met, then by pantographs that meet
@@ -375,7 +375,7 @@ def search_table(
     search, found = study.table["search"], []
     for title, rows in searched.items():
         met = [one.number for one in judge(statements, rows) if one.verdict == REPRODUCED]
-        kept, of = n_met(statements[search["counts"] - 1], rows)
+        kept, of = _n_met(statements[search["counts"] - 1], rows)
         cells = [_range(rows, **one) for one in search["shown"]]
         listed = ", ".join(map(str, met))
         found.append((len(met), kept, [title, len(met), listed, f"{kept} of {of}", *cells]))
@@ -474,8 +474,8 @@ def movers(statement: Statement, ranked: Sequence[Ranked]) -> str:
     text = (
         f"One pantograph, {alone.damping}: {column.head} {in_words(start)} in the case; {moved}. "
     )
-    holds = holds_alone(statement, case.rows)
-    turned = [one.title for one in varied if holds_alone(statement, one.rows) != holds]
+    holds = _holds_alone(statement, case.rows)
+    turned = [one.title for one in varied if _holds_alone(statement, one.rows) != holds]
     if holds:
         text += "It satisfies the statement: the second pantograph makes the difference. "
         return text + (f"Alone it fails with {_some(turned)}." if turned else "").strip()

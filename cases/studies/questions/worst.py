@@ -135,7 +135,7 @@ def worst_places(results: Results) -> WorstPlaces:
     names = list(results.roles)
     of_arms = _of_several(results.arm_wires())
     of_droppers = _of_several([names[wire] for wire in results.dropper_wires()[:, 1].tolist()])
-    likes = dropper_likes(results)
+    likes = _dropper_likes(results)
     times = stats.slack_times(results)
     passed_to = _passed_to(results)
     arms, hung = (one.evaluated & (one.x <= passed_to) for one in (supports, droppers))
@@ -170,7 +170,7 @@ def _of_several(wires: Sequence[str]) -> list[str]:
     return [wire_words(name) if several else "" for name in wires]
 
 
-def spans_in_stretch(results: Results) -> list[int]:
+def _spans_in_stretch(results: Results) -> list[int]:
     """Numbers of the spans that lie within the evaluated stretch, from 0."""
     within = in_stretch(results.line("support_x"), *results.evaluation)
     return [int(number) for number in np.flatnonzero(within[:-1] & within[1:])]
@@ -182,7 +182,7 @@ def _passages(results: Results) -> list[Passage]:
         position, force = results.column("contact_position", p), results.column("contact_force", p)
         filtered = filters.contact_force(results, p)
         own = []
-        for span in spans_in_stretch(results):
+        for span in _spans_in_stretch(results):
             start, end = float(masts[span]), float(masts[span + 1])
             if not stats.covers(position, (start, end)):
                 continue
@@ -209,7 +209,7 @@ def stands_out(values: np.ndarray) -> list[bool | None]:
     return [bool(one) for one in beyond]
 
 
-def dropper_likes(results: Results) -> np.ndarray:
+def _dropper_likes(results: Results) -> np.ndarray:
     """Number of the group of each dropper, (n_droppers,): those at the same share of a span."""
     x, span, masts = (
         results.line("dropper_x"),
@@ -444,7 +444,7 @@ class Causes:
             return {}
         x, lift = self._elasticity
         found = {}
-        for span in spans_in_stretch(self._results):
+        for span in _spans_in_stretch(self._results):
             # An anchored wire does not give way; that is no elasticity of the line.
             (own,) = np.nonzero(
                 (x >= self._masts[span]) & (x <= self._masts[span + 1]) & (lift > _ANCHORED)
@@ -484,13 +484,13 @@ class Causes:
             span: np.interp(
                 self._masts[span] + share * (self._masts[span + 1] - self._masts[span]), x, height
             )
-            for span in spans_in_stretch(self._results)
+            for span in _spans_in_stretch(self._results)
         }
 
     def _droppers_at_rest(self, start: float, end: float) -> Iterator[str]:
         """Droppers that carry much more or less at rest than those at the same place of a span."""
         x, force = self._results.line("dropper_x"), self._results.static("dropper_force")
-        likes = dropper_likes(self._results)
+        likes = _dropper_likes(self._results)
         evaluated = in_stretch(x, *self._results.evaluation)
         for number in np.flatnonzero((x >= start) & (x <= end)):
             others = force[(likes == likes[number]) & evaluated]

@@ -65,7 +65,7 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
         If a key has no value of its own that stands for a missing mean, or takes no field, or if a
         key sets another one again or changes nothing.
     """
-    cube = points(sampling)
+    cube = _points(sampling)
     where = f"in {file}"
     own = resolved(scene)
     _refuse_lost(sampling, own, where)
@@ -97,7 +97,7 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
     ):
         numbers = seeds(column)
         varied = (*sampling.keys, *(other for other in sampling.fields if other != key))
-        texts = fields_as_text(key, field, scene, varied, sampling.seed, numbers, where)
+        texts = _fields_as_text(key, field, scene, varied, sampling.seed, numbers, where)
         columns[field_column(key)] = [str(number) for number in numbers]
         assigned.append([f"{key}={text}" for text in texts])
     names = list(columns)
@@ -179,16 +179,13 @@ def _own_number(key: str, own: dict[str, Any]) -> float:
     return float(here)
 
 
-def points(sampling: SamplingTable) -> np.ndarray:
-    """Points of the open unit cube, one a sample, uniform and with the wanted correlation.
+def _points(sampling: SamplingTable) -> np.ndarray:
+    """Points of the open unit cube, one a sample, (n_samples, n_columns), uniform and with the
+    wanted correlation.
 
     Sobol points are scrambled (Owen 1998); with them, and with random ones, a larger ``n`` begins
     with the same points. Samples of ``saltelli`` stand in the order of SALib: a base sample, those
     in which one coordinate is another's, the other base sample.
-
-    Returns
-    -------
-    ndarray, shape (sampling.n_samples, number of sampling.columns)
     """
     from scipy.stats import qmc
 
@@ -239,17 +236,11 @@ def _correlated(uniform: np.ndarray, sampling: SamplingTable) -> np.ndarray:
     return np.clip(ndtr(ndtri(uniform) @ factor.T), _EDGE, 1.0 - _EDGE)
 
 
-def normal_rows(seed: int, name: str, realisations: Sequence[int], n: int) -> np.ndarray:
-    """Independent standard normal numbers, a row for each realisation.
+def _normal_rows(seed: int, name: str, realisations: Sequence[int], n: int) -> np.ndarray:
+    """Independent standard normal numbers, a row of ``n`` for each realisation.
 
-    A row depends on seed, name and realisation only, so that the same one always comes again.
-
-    Parameters
-    ----------
-    seed : of the sampling
-    name : of the field
-    realisations : whole numbers
-    n : length of a row
+    A row depends on the sampling's seed, the field's name and the number of the realisation only,
+    so that the same one always comes again.
     """
     # A counter-based generator (Salmon et al. 2011) is set to a key in no time.
     philox = np.random.Philox(key=0)
@@ -295,7 +286,7 @@ class Carrier(NamedTuple):
     text: Callable[[np.ndarray], str]
 
 
-def fields_as_text(
+def _fields_as_text(
     key: str,
     table: FieldTable,
     scene: Scene,
@@ -304,23 +295,8 @@ def fields_as_text(
     realisations: Sequence[int],
     where: str,
 ) -> list[str]:
-    """The values of a key that takes a field, one for each realisation, as texts of TOML.
-
-    Parameters
-    ----------
-    key : of the scene
-    table : distribution and correlation along the line
-    scene : whose line it is
-    varied : keys that vary too
-    seed : of the sampling
-    realisations : numbers of the realisations; the same number gives the same field
-    where : place of the field's table, for sentences
-
-    Raises
-    ------
-    InputError
-        If the key takes no field, if a varied key moves its places, or if it has too many of them.
-    """
+    """The values of a key that takes a field, one for each realisation, as texts of TOML. Keys that
+    are ``varied`` too must not move its places; ``where`` says where the field's table stands."""
     make = _CARRIERS.get(key)
     if make is None:
         raise InputError(f"fields.{key} {where} takes no field; there are {', '.join(_CARRIERS)}")
@@ -347,21 +323,16 @@ def fields_as_text(
     factor = _factor(key, table, carrier.places, where)
     texts: list[str] = []
     for begin in range(0, len(realisations), _BATCH):
-        normal = normal_rows(seed, key, realisations[begin : begin + _BATCH], n)
+        normal = _normal_rows(seed, key, realisations[begin : begin + _BATCH], n)
         if factor is not None:
             normal = normal @ factor.T
         texts += map(carrier.text, carrier.own + _values(key, table, normal, where))
     return texts
 
 
-def correlation(table: FieldTable, places: np.ndarray) -> np.ndarray:
-    """Correlation of the normal quantities behind a field, shape (n, n).
-
-    Parameters
-    ----------
-    table : with a correlation length above 0
-    places : shape (n,) [m]
-    """
+def _correlation(table: FieldTable, places: np.ndarray) -> np.ndarray:
+    """Correlation (n, n) of the normal quantities behind a field at ``places`` (n,) [m], of a table
+    with a correlation length above 0."""
     distance = np.abs(places[:, None] - places) / table.correlation_length_m
     return np.asarray(np.exp(-distance if table.correlation == "exponential" else -(distance**2)))
 
@@ -376,7 +347,7 @@ def _factor(key: str, table: FieldTable, places: np.ndarray, where: str) -> np.n
             "are allowed"
         )
     # A Gaussian correlation is singular to rounding: eigenvalues below that are zero.
-    values, vectors = np.linalg.eigh(correlation(table, places))
+    values, vectors = np.linalg.eigh(_correlation(table, places))
     return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
 
 

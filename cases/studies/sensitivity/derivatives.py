@@ -494,7 +494,7 @@ def along_span(found: RestSensitivity) -> StudyTable:
     return StudyTable(columns, rows)
 
 
-def rest_table(found: RestSensitivity) -> StudyTable:
+def _rest_table(found: RestSensitivity) -> StudyTable:
     """A row for each parameter: what it changes most in the span; the largest change first."""
     columns = [
         Column("parameter", "parameter"),
@@ -535,7 +535,7 @@ def rest_text(found: RestSensitivity) -> str:
         elasticity_text(found.x, found.elasticity),
         "",
         "Changes under a change of each parameter; of the height the largest:",
-        rest_table(found).text(),
+        _rest_table(found).text(),
     ]
     lines += [f"{key} is left out: {why}" for key, why in found.left_out.items()]
     return "\n".join(lines)

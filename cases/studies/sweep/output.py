@@ -163,7 +163,7 @@ def files_of(
             draw_statistics, table.rows, varied_keys(ended), plotted or PLOTTED
         )
     if histogram:
-        content |= histogram_files(ended)
+        content |= _histogram_files(ended)
     return content
 
 
@@ -276,7 +276,7 @@ def force_histograms(ended: Sequence[Ended]) -> pd.DataFrame | None:
     return pd.DataFrame(percent, rows, HISTOGRAM_BIN * np.arange(first, last))
 
 
-def histogram_files(ended: Sequence[Ended]) -> dict[str, Content]:
+def _histogram_files(ended: Sequence[Ended]) -> dict[str, Content]:
     """Table and picture of the histograms of a sweep, nothing if there are none."""
     found = force_histograms(ended)
     if found is None:
@@ -285,12 +285,12 @@ def histogram_files(ended: Sequence[Ended]) -> dict[str, Content]:
     rows = ([*own, *row] for own, row in zip(found.index, found.to_numpy().tolist(), strict=True))
     return {
         HISTOGRAM_TABLE: file_table(heads, rows),
-        HISTOGRAM_PICTURE: lambda: draw_histograms(found),
+        HISTOGRAM_PICTURE: lambda: _draw_histograms(found),
     }
 
 
 @figures.own_style()
-def draw_histograms(found: pd.DataFrame) -> Figure:
+def _draw_histograms(found: pd.DataFrame) -> Figure:
     """The mean share of time in each bin, and between which shares 90 % of the variants lie."""
     figure = figures.new_figure(3.4)
     axes = figure.subplots()

@@ -45,7 +45,7 @@ def files_of(plan: Plan, found: Sequence[Tolerance]) -> dict[str, Content]:
     return {
         TABLE: table_of(found),
         RECORD: record,
-        PAGE: markdown(plan, found),
+        PAGE: _markdown(plan, found),
         SHARES: partial(draw_shares, plan, found),
         VALUES: partial(draw_values, found),
     }
@@ -146,7 +146,7 @@ def _first_to_fail(found: Sequence[Tolerance]) -> str:
     return "none up to there" if first.at_most else first.criterion
 
 
-def remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
+def _remarks(plan: Plan, found: Sequence[Tolerance]) -> list[str]:
     """Sentences on what the tables cannot say."""
     sentences = []
     if lost := _lost(found):
@@ -181,15 +181,15 @@ def as_text(plan: Plan, found: Sequence[Tolerance]) -> str:
     """The results for a terminal."""
     tables = (installer_table(plan, found), table_of(found))
     parts = [f"{table.title}\n{table.text()}\n" for table in tables]
-    return "\n".join([*parts, *(f"REMARK      {text}" for text in remarks(plan, found))])
+    return "\n".join([*parts, *(f"REMARK      {text}" for text in _remarks(plan, found))])
 
 
-def markdown(plan: Plan, found: Sequence[Tolerance]) -> str:
+def _markdown(plan: Plan, found: Sequence[Tolerance]) -> str:
     """The results as a page."""
     tables = (installer_table(plan, found), table_of(found))
     parts = [f"# Tolerances of {plan.name}"]
     parts += [f"## {table.title}\n\n{table.markdown()}" for table in tables]
-    parts.append("\n".join(f"- {text}" for text in remarks(plan, found)))
+    parts.append("\n".join(f"- {text}" for text in _remarks(plan, found)))
     return "\n\n".join(parts) + "\n"
 
 

@@ -90,10 +90,10 @@ def evaluate(table: RunTable) -> Uncertainty:
                 continue
             here = {"statistic": name, "pantograph": pantograph, "n": len(x)}
             ends = {"minimum": float(x.min()), "maximum": float(x.max())}
-            estimated = named("mean", mean(x)) | named("standard_deviation", deviation(x)) | ends
+            estimated = _named("mean", mean(x)) | _named("standard_deviation", deviation(x)) | ends
             statistics.append({**here, **estimated})
             quantiles += [
-                {**here, "probability": p, **named("value", quantile(x, p))} for p in QUANTILES
+                {**here, "probability": p, **_named("value", quantile(x, p))} for p in QUANTILES
             ]
     runs = table.runs
     n_done = int((runs["outcome"] == DONE).sum())
@@ -130,11 +130,11 @@ def independent_runs(table: RunTable) -> RunTable:
     sampling = table.sampling
     if sampling is None or sampling.method != SALTELLI:
         return table
-    kept = table.frame["variant"].isin(base_samples(sampling))
+    kept = table.frame["variant"].isin(_base_samples(sampling))
     return table._replace(frame=table.frame[kept])
 
 
-def base_samples(sampling: SamplingTable) -> set[str]:
+def _base_samples(sampling: SamplingTable) -> set[str]:
     """Names of the samples of Saltelli's two base matrices: first and last of each block."""
     block = sampling.block
     return {sample_name(block * i + place) for i in range(sampling.n) for place in (1, block)}
@@ -179,7 +179,7 @@ def _united(lists: Iterable[Sequence[str]]) -> list[str]:
 
 def _probability(criterion: str, failed: int, n: int) -> Row:
     head = {"criterion": criterion, "n": n, "failed": failed}
-    return {**head, **named("probability", share(failed, n))}
+    return {**head, **_named("probability", share(failed, n))}
 
 
 class Bounded(NamedTuple):
@@ -281,7 +281,7 @@ def share(hits: int, n: int) -> Bounded:
     return Bounded(hits / n, float(interval.low), float(interval.high))
 
 
-def named(name: str, one: Bounded) -> dict[str, Any]:
+def _named(name: str, one: Bounded) -> dict[str, Any]:
     """An estimate as three cells of a row."""
     return {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high}
 

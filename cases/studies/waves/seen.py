@@ -424,7 +424,7 @@ def measured_rows(
             "bands of the periodic line"
         )
         rows.append(row_of("energy_in_pass_bands", spectrum.inside, "-", note))
-    branches = [branch_of_fastest(waves, highest) for highest in _UP_TO]
+    branches = [_branch_of_fastest(waves, highest) for highest in _UP_TO]
     if np.array_equal(branches[0][0], branches[1][0]):
         del branches[1:]  # one has the fastest wave of all
     for number, (frequency, velocity) in enumerate(branches, start=1):
@@ -520,7 +520,7 @@ def _stations(theory: WaveTheory, seen: WavesSeen) -> tuple[int, int] | None:
     return first, second
 
 
-def branch_of_fastest(waves: BlochWaves, highest: float) -> tuple[np.ndarray, np.ndarray]:
+def _branch_of_fastest(waves: BlochWaves, highest: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (n,), ascending [Hz], and group velocities [m/s] of the branch that has the
     fastest wave up to the frequency ``highest`` [Hz]."""
     speed = np.where(waves.frequency <= highest, np.abs(waves.group_velocity), 0.0)

@@ -240,9 +240,9 @@ def _write_waves(
         *measured_rows(theory, seen, spectra), *reflection_rows(reflections, theory.speed)
     ]  # fmt: skip
     content: dict[str, Content] = {
-        "energy.csv": energy_rows(energy, seen) if energy.time.size > 1 else [],
+        "energy.csv": _energy_rows(energy, seen) if energy.time.size > 1 else [],
         TABLE: [*as_rows(theory), *measured],
-        "pass_bands.csv": band_rows(theory),
+        "pass_bands.csv": _band_rows(theory),
         "space_time.png": lambda: pictures.space_time(seen, theory, supports, moving),
         "wavenumbers.png": lambda: pictures.wavenumbers(seen, theory, what),
         "energy.png": lambda: (
@@ -259,10 +259,10 @@ def _write_waves(
         content["train_frame.png"] = lambda: pictures.train_frame(
             seen, theory, _BEHIND, _AHEAD, origin
         )
-    return as_text(theory, measured, remarks), write_files(folder, content)
+    return _as_text(theory, measured, remarks), write_files(folder, content)
 
 
-def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
+def _energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
     """Energy of the line over time [J]: behind, between and ahead of the moving sources.
 
     ``seen`` has the places of the pantographs or of a moving force, or the place of a blow.
@@ -307,7 +307,7 @@ def as_rows(theory: WaveTheory) -> list[Row]:
     return [row_of(*row) for row in rows if np.isfinite(row[1])]
 
 
-def band_rows(theory: WaveTheory) -> list[Row]:
+def _band_rows(theory: WaveTheory) -> list[Row]:
     """Pass bands of the periodic line, and ranges that outrun the train [Hz]."""
     found = {"pass band": theory.bands(), "outruns the train": theory.outrunning()}
     return [
@@ -317,7 +317,7 @@ def band_rows(theory: WaveTheory) -> list[Row]:
     ]
 
 
-def as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str]) -> str:
+def _as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str]) -> str:
     """Figures of theory and ``measured`` ones for a terminal, and ``remarks`` on the run that shows
     the waves."""
     rows = [*as_rows(theory), *measured]

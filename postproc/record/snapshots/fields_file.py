@@ -315,7 +315,7 @@ class FieldsFile:
         """List in the XDMF file the snapshots that are there."""
         if self._text is None:
             blocks = {
-                slots.name: grids_of(slots, self._planned, self.path.name, places)
+                slots.name: _grids_of(slots, self._planned, self.path.name, places)
                 for slots, places in zip(self._layout, self._places, strict=True)
             }
             self._text = GrowingXdmf(self._xdmf, blocks, len(self._written))
@@ -393,22 +393,11 @@ def _block_begin(name: str) -> bytes:
     return f'      <Grid Name="{name}" GridType="Collection" CollectionType="Temporal">\n'.encode()
 
 
-def grids_of(
+def _grids_of(
     slots: Slots, times: list[float], h5_name: str, offsets: Mapping[str, int]
 ) -> list[str]:
-    """The grids of a block at ``times`` [s].
-
-    Parameters
-    ----------
-    slots : Slots
-        Layout of the block in the file.
-    times : list of float
-        Times of the snapshots [s].
-    h5_name : str
-        File of the numbers, relative to that of the text.
-    offsets : mapping
-        Place in that file at which each table of the block begins, by name [B].
-    """
+    """The grids of a block at ``times`` [s]. ``h5_name`` is the file of the numbers, relative to
+    that of the text, ``offsets`` the place in it at which each table of the block begins [B]."""
     # Grids differ in numbers only: one text for all, into which these are put.
     moves = bool(np.ptp(slots.first) or np.ptp(slots.count))
     file, block = h5_name.replace("%", "%%"), slots.name.replace("%", "%%")
