@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from catenary.cases.ambrosio2012.passages import leading_position, mid_span
 from catenary.cases.studies.paper.runs import LEADING, SINGLE, TRAILING, Rows, name_of
 from catenary.postproc.evaluate import filters
-from catenary.postproc.evaluate.passages import leading_position, mid_span
 from catenary.postproc.evaluate.statistics import histogram
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import figures

@@ -27,7 +27,7 @@ def variants(scene: Scene, shortened: bool) -> list[StudyVariant]:
 
 def measure(results: Results) -> dict[str, Any]:
     """Beside the summary: slack droppers by passage, onset of the uplift, wave and train speed."""
-    from catenary.postproc.evaluate import passages
+    from catenary.cases.ambrosio2012 import passages
 
     return passages.measure(results)
 

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.callers import listed
+from catenary.cases.scene.scene import problem_of
+from catenary.meshgen.wires import Role
 from catenary.scenes import SceneLike, checked
 
 if TYPE_CHECKING:
@@ -220,9 +223,6 @@ class AtRest:
         """
         import pandas as pd
 
-        from catenary.cases.scene.scene import problem_of
-        from catenary.meshgen.wires import Role
-
         names = [wire.name for wire in problem_of(self._scene).line.wires_of(Role.CONTACT)]
         sizes = [self._data[f"wires/{name}"].size for name in names]
         columns = {"x_m": "contact_x", "height_m": "contact_height", "y_m": "contact_y"}
@@ -316,7 +316,6 @@ class AtRest:
         """
         import xarray as xr
 
-        from catenary.callers import listed
         from catenary.cases.studies.sensitivity.derivatives import rest_sensitivity_of
 
         names = listed(parameters, "parameters")

@@ -16,7 +16,10 @@ from catenary.callers import (
     say_nothing,
     say_on_error_stream,
 )
+from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.studies.optimise.task import OptimiseTask
+from catenary.cases.studies.records import held_study
+from catenary.cases.studies.scene_sets import workers
 from catenary.cases.studies.task_files import read_task
 from catenary.cases.studies.tolerance.errors import ToleranceTask
 from catenary.scenes import Scene, SceneLike, draft_of, scene_of, tables_or_file
@@ -283,9 +286,6 @@ def _made(
     Interrupted
         If a signal ends the study.
     """
-    from catenary.cases.result_folder.output_folder import refuse_table
-    from catenary.cases.studies.records import held_study
-    from catenary.cases.studies.scene_sets import workers
 
     n_jobs, folder = n_at_once(jobs), folder_of(out)
     if folder is not None:

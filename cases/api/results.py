@@ -29,6 +29,14 @@ if TYPE_CHECKING:
     from catenary.postproc.report.page import Picture
     from catenary.scenes import Scene
 
+_PLACES = {channels.ARM: "arm_x", channels.DROPPER: "dropper_x", channels.WIRE_END: "end_x"}
+_PLACE = {"units": "m", "long_name": "position along the track"}
+_WORDS = (
+    *("name", "kind", "model", "criterion", "unit", "relation", "clause", "wire"),
+    *("book", "rule", "because"),
+)
+_TRUE_OR_FALSE = ("passed", "evaluated", "compared")
+
 
 class Pictures:
     """Pictures of a run: ``run.plot``. Not collective.
@@ -170,13 +178,6 @@ _COLUMNS = {
     channels.DROPPER: "dropper",
     channels.WIRE_END: "wire_end",
 }
-_PLACES = {channels.ARM: "arm_x", channels.DROPPER: "dropper_x", channels.WIRE_END: "end_x"}
-_PLACE = {"units": "m", "long_name": "position along the track"}
-_WORDS = (
-    *("name", "kind", "model", "criterion", "unit", "relation", "clause", "wire"),
-    *("book", "rule", "because"),
-)
-_TRUE_OR_FALSE = ("passed", "evaluated", "compared")
 
 
 class Run:

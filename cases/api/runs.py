@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.base.files import is_folder
 from catenary.base.options import option
 from catenary.base.parallel import on_root
 from catenary.callers import (
@@ -23,7 +22,11 @@ from catenary.callers import (
     temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
-from catenary.cases.result_folder.output_folder import run_folder
+from catenary.cases.result_folder.output_folder import (
+    refuse_impossible,
+    refuse_no_folder,
+    run_folder,
+)
 from catenary.scenes import SceneLike, checked, draft_of, scene_of
 
 if TYPE_CHECKING:
@@ -191,14 +194,12 @@ def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None)
     InputError
         If there is no run, or as ``cases.run.continuing.extended_scene``.
     """
-    from catenary.cases.result_folder.output_folder import refuse_impossible
     from catenary.cases.run.continuing import EVALUATE, UNTIL, extended_scene
     from catenary.postproc.read.guard import examined
     from catenary.postproc.read.results import Results
 
     refuse_impossible(folder)
-    if not is_folder(folder):
-        raise InputError(f"{folder} is no folder; name the folder of a run")
+    refuse_no_folder(folder)
     if evaluate is not None and until_m is None:
         raise InputError(f"{option(*EVALUATE)} belongs to {option(*UNTIL)}")
     with Results(folder, examined(folder)) as results:

@@ -264,7 +264,7 @@ def sweep(
         raise InputError("histories are kept in a file: give the folder out, too")
     draft, comm = draft_of(scene), communicator(comm)
     if sample is None:
-        variants, sampling = _listed(vary), None
+        variants, sampling = _variants_of(vary), None
     elif vary is not None:
         raise InputError("sample makes all variants itself: give vary or sample, not both")
     else:
@@ -306,7 +306,7 @@ def samples_of(
     return samples(sampling, draft.scene(), where), sampling
 
 
-def _listed(vary: Mapping[str, Iterable[Any]] | None) -> list[Variant]:
+def _variants_of(vary: Mapping[str, Iterable[Any]] | None) -> list[Variant]:
     """The variants of lists of values."""
     if vary is not None and not isinstance(vary, Mapping):
         raise InputError(f"vary is {shown(vary)}; it must be a table of lists of values by keys")

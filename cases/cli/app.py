@@ -16,11 +16,17 @@ import typer
 
 import catenary
 from catenary.base.errors import InputError
-from catenary.base.files import is_folder
+from catenary.base.parallel import (
+    abort_on_unforeseen_error,
+    launched_by_mpirun,
+    on_root,
+    set_up_logging,
+)
 from catenary.cases.cli import command_words
 from catenary.cases.cli.command_words import Verb
-from catenary.cases.result_folder.output_folder import run_folder
+from catenary.cases.result_folder.output_folder import refuse_no_folder, run_folder
 from catenary.cases.terminal import console
+from catenary.postproc.evaluate.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -310,7 +316,6 @@ def crowded(comm: Any) -> str:
     if comm.size == 1 or not hasattr(os, "sched_getaffinity"):  # the latter: not Linux
         return ""
     from catenary.base.mpi import MPI
-    from catenary.postproc.evaluate.wording import counted
 
     here = comm.Split_type(MPI.COMM_TYPE_SHARED)
     n_ranks, n_cores = here.size, len(set().union(*here.allgather(os.sched_getaffinity(0))))
@@ -332,12 +337,6 @@ def begin(
     Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
     whose ``[petsc]`` table stands before them.
     """
-    from catenary.base.parallel import (
-        abort_on_unforeseen_error,
-        launched_by_mpirun,
-        on_root,
-        set_up_logging,
-    )
     from catenary.cases.process.petsc_options import (
         as_arguments,
         idle_options,
@@ -376,9 +375,13 @@ def records_of(folder: Path) -> Records | None:
     """
     from catenary.postproc.read.guard import examined
 
-    if not is_folder(folder):
-        raise InputError(f"{folder} is no folder; name the folder of a run")
+    refuse_no_folder(folder)
     return examined(folder)
+
+
+def names_in(text: str | None) -> list[str]:
+    """The names of a list with commas, none without it."""
+    return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def print_findings(text: str, files: Sequence[Path]) -> None:

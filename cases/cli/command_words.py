@@ -13,6 +13,11 @@ from typing import Any
 
 from typer.core import TyperCommand
 
+VARY = "--vary"
+# Options of PETSc, whose first letter would be taken for an option of the verb, the rest for its
+# value: -options_view for -o.
+_OF_PETSC = re.compile(r"-(?!o)[a-z]+(_[a-z]+)+|-(options|on_error)_[a-z]+")
+
 
 def cases(incomplete: str) -> list[tuple[str, str]]:
     """Names of shipped cases with their titles; shells complete paths themselves."""
@@ -63,12 +68,6 @@ def axes(incomplete: str) -> list[tuple[str, str]]:
         for name, axis in AXES.items()
         if name.startswith(begun) and name not in taken
     ]
-
-
-VARY = "--vary"
-# Options of PETSc, whose first letter would be taken for an option of the verb, the rest for its
-# value: -options_view for -o.
-_OF_PETSC = re.compile(r"-(?!o)[a-z]+(_[a-z]+)+|-(options|on_error)_[a-z]+")
 
 
 class Verb(TyperCommand):

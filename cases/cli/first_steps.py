@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Annotated
 import typer
 
 from catenary.base.errors import InputError
+from catenary.base.parallel import launched_by_mpirun
 from catenary.cases.cli import command_words
 from catenary.cases.cli.app import serial_verb
 from catenary.cases.terminal import console
@@ -81,8 +83,6 @@ def list_cases(
             f"`catenary list --rules {wanted}`"
         )
     if schema:
-        import json
-
         from catenary.cases.terminal.lists import scene_schema
 
         console.say(json.dumps(scene_schema(), indent=1), whole=True)
@@ -170,7 +170,6 @@ def new(
 )
 def doctor() -> int:
     """Serial."""
-    from catenary.base.parallel import launched_by_mpirun
     from catenary.cases.process.installation import examined
 
     if launched_by_mpirun():

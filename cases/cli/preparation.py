@@ -14,15 +14,17 @@ import typer
 
 import catenary
 from catenary.base.errors import InputError
+from catenary.base.parallel import launched_by_mpirun
 from catenary.cases.cli.app import (
     Force,
     Jobs,
     SceneWords,
     folder_option,
+    names_in,
     print_findings,
     serial_verb,
 )
-from catenary.cases.result_folder.output_folder import new_file
+from catenary.cases.result_folder.output_folder import new_file, refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
 
@@ -91,7 +93,7 @@ def plan(
             200.0 if stretch is None else _within("--stretch-m", stretch, 1.0, 1e7),
             10 if rounds is None else int(_within("--rounds", rounds, 1, _MOST_ROUNDS)),
             wanted,
-            [] if only is None else [name.strip() for name in only.split(",")],
+            names_in(only),
         )
         return _cost(options, out, as_json, n_jobs, force)
     belonging = {
@@ -114,10 +116,8 @@ def _within(option: str, value: float, low: float, high: float) -> float:
 
 def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
     """Runs ``--cost``; returns the exit code."""
-    from catenary.base.parallel import launched_by_mpirun
     from catenary.callers import temporary_folder
     from catenary.cases.process.petsc_options import as_arguments, start_petsc
-    from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
     from catenary.cases.scene.load import load_scene
     from catenary.cases.studies.records import held_study
 

@@ -11,9 +11,10 @@ import typer
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.files import is_file, is_folder
 from catenary.cases.cli.app import Force, RunFolder, folder_option, records_of, serial_verb
+from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 from catenary.postproc.files.own_files import RUN_FILE
-from catenary.postproc.film.options import View
+from catenary.postproc.film.options import FilmOptions, View
 
 if TYPE_CHECKING:
     from catenary.mbs.shape import Shape
@@ -183,7 +184,6 @@ def _compare_measured(
     from catenary.cases.studies.measured import read_description
 
     wanted = None if description is None else read_description(description)
-    from catenary.cases.result_folder.output_folder import refuse_table
     from catenary.cases.studies.measured import passage_of, read_table, usual_description
     from catenary.postproc.measurements import compared
     from catenary.postproc.measurements.comparison import compare_with
@@ -199,7 +199,7 @@ def _compare_measured(
         found = compare_with(results, passage_of(table, file, wanted, beside, results))
     console.say(compared.as_text(found))
     if out is not None:
-        console.say("\n" + "\n".join(map(str, compared.write(out, found))))
+        console.say("\n" + "\n".join(map(str, compared.write_comparison(out, found))))
 
 
 @serial_verb(
@@ -244,7 +244,6 @@ def animate(
 ) -> None:
     """Serial."""
     from catenary.postproc.film.animate import animate as make_film
-    from catenary.postproc.film.options import FilmOptions
 
     options = FilmOptions(start, end, rate, every, width, motion, view, camera)
     records = records_of(folder)

@@ -29,6 +29,8 @@ from catenary.cases.cli.app import (
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
+from catenary.postproc.evaluate.wording import duration
+from catenary.postproc.files.own_files import RUN_FILE
 
 if TYPE_CHECKING:
     import catenary
@@ -261,7 +263,6 @@ def submit(
     if array is None:
         from catenary.cases.run.continuing import refuse_other_scene
         from catenary.cases.scene.load import load_scene
-        from catenary.postproc.files.own_files import RUN_FILE
 
         scene = load_scene(words.case, chosen, words.shortened)
         refuse_other_scene(out / RUN_FILE, scene)
@@ -295,7 +296,6 @@ def _needs_on(scene: Scene, job: SlurmJob) -> tuple[float, float]:
     from catenary.cases.run.plan import make_plan
     from catenary.cases.scene.checks.mesh_size import MEMORY_OF_RANK_PER_UNKNOWN
     from catenary.cases.scene.scene import problem_of
-    from catenary.postproc.evaluate.wording import duration
 
     plan = make_plan(scene)
     n_unknowns = int(plan.figures["n_unknowns"])

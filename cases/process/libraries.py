@@ -1,10 +1,10 @@
 """Libraries: their settings before they are loaded, memory to load them, and their versions.
 
-The settings are not for other people's Python programs.
+``choose_settings`` is for the program, not for other people's Python programs.
 
-Pictures have the program's own style, and Matplotlib a folder for its cache. It reads a
-``matplotlibrc`` at import: that in the working directory, else that of ``MATPLOTLIBRC``, else that
-of the user. One that is no text ends the import.
+Pictures have the program's own style, and Matplotlib a folder for its cache. At its import it reads
+a ``matplotlibrc``: that in the working directory, else that of ``MATPLOTLIBRC``, else that of the
+user. One that is no text ends the import.
 """
 
 from __future__ import annotations
@@ -23,6 +23,14 @@ from collections.abc import Iterator
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+
+# Address space that program and libraries take before any data, with a margin; a report of a short
+# run was written within 0.7 GB, and OpenBLAS tries for ever to get memory within 0.45 GB [B].
+LEAST_MEMORY = 700_000_000
+CACHE_VARIABLE = "MPLCONFIGDIR"
+_MATPLOTLIBRC, _MATPLOTLIBRC_HERE = "MATPLOTLIBRC", Path("matplotlibrc")
+# Python packages that leave a record of their version, in the order in which they are printed.
+_PACKAGES = ("numpy", "scipy", "gmsh", "meshio", "pydantic", "typer")
 
 
 def choose_settings() -> None:
@@ -46,11 +54,6 @@ def choose_settings() -> None:
     os.environ.setdefault("OMPI_MCA_opal_signal", "")
 
 
-# Address space that program and libraries take before any data, with a margin; a report of a short
-# run was written within 0.7 GB, and OpenBLAS tries for ever to get memory within 0.45 GB [B].
-LEAST_MEMORY = 700_000_000
-
-
 def too_little_memory() -> str:
     """Sentence if this process's limit leaves too little memory, else "". Not collective."""
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
@@ -60,10 +63,6 @@ def too_little_memory() -> str:
         f"this process may take {limit / 1e6:.0f} MB of memory (ulimit -v), and the program with "
         f"its libraries needs {LEAST_MEMORY / 1e6:.0f} MB before any data; raise the limit"
     )
-
-
-CACHE_VARIABLE = "MPLCONFIGDIR"
-_MATPLOTLIBRC, _MATPLOTLIBRC_HERE = "MATPLOTLIBRC", Path("matplotlibrc")
 
 
 def leave_out_matplotlibrc() -> None:
@@ -132,10 +131,6 @@ def _is_writable(path: Path) -> bool:
         return True
     except OSError:
         return False
-
-
-# Python packages that leave a record of their version, in the order in which they are printed.
-_PACKAGES = ("numpy", "scipy", "gmsh", "meshio", "pydantic", "typer")
 
 
 @cache

@@ -95,6 +95,12 @@ def remove_dead_parts(folder: Path, names: Container[str] | None = None) -> None
                 path.unlink()
 
 
+def refuse_no_folder(folder: Path) -> None:
+    """Raise InputError if a path is no folder where the folder of a run is wanted."""
+    if not is_folder(folder):
+        raise InputError(f"{folder} is no folder; name the folder of a run")
+
+
 def run_folder(path: str | Path) -> Path:
     """The folder of a run, for which its result file may stand. Not collective."""
     path = Path(path)

@@ -31,6 +31,7 @@ FELT = 1e-3
 START_SHARE = 0.8
 # Above this share of the standard deviation the run-in counts as short [-].
 SHORT_RUN_IN = 0.2
+SIDES = ("start", "end")
 
 
 class WaveLine(NamedTuple):
@@ -113,7 +114,7 @@ def arrivals(line: WaveLine, course: Course) -> Arrivals:
         run_in / line.span,
         start_share(line, course.speed, run_in),
         _within(from_far_end(line, course), course),
-        _within(from_near_end(line, course), course),
+        _within(_from_near_end(line, course), course),
         far_share(line, course),
     )
 
@@ -133,7 +134,7 @@ def from_far_end(line: WaveLine, course: Course) -> Meeting | None:
     return Meeting(course.start + course.speed * time, time)
 
 
-def from_near_end(line: WaveLine, course: Course) -> Meeting | None:
+def _from_near_end(line: WaveLine, course: Course) -> Meeting | None:
     """The first wave that the near end reflects and that catches up from behind: c t = x_rear + x +
     v t, from the near end; None if the train is as fast."""
     if course.speed >= line.speed:
@@ -195,16 +196,13 @@ def _within(met: Meeting | None, course: Course) -> Meeting | None:
     return met if met is not None and met.at <= course.end else None
 
 
-SIDES = ("start", "end")
-
-
 def end_sentences(problem: Problem) -> tuple[str, str]:
     """Begin and end of the line, in words."""
     start, end = (f"{side} {_of_end(kind)}" for side, kind in zip(SIDES, problem.ends, strict=True))
     return start, end
 
 
-def end_warnings(problem: Problem) -> list[str]:
+def _end_warnings(problem: Problem) -> list[str]:
     """Sentences on how the ends of the line may spoil a run."""
     line, train = problem.line, problem.train
     masts, n = line.support_positions, line.n_spans
@@ -272,7 +270,7 @@ def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
         ],
         "ends": list(end_sentences(problem)),
         "warnings": [
-            *end_warnings(problem),
+            *_end_warnings(problem),
             *_reflections(scene, traced),
             *_short_run_in(problem, traced),
             *_short_stretch(problem, traced),

@@ -16,7 +16,7 @@ from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.run.arrivals import arrival_facts
 from catenary.cases.run.description import defect_facts, kind_lines
-from catenary.cases.run.scene_mesh import mesh_of
+from catenary.cases.run.scene_mesh import half_head_of, mesh_of
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.terminal.terminal_text import static_text
 from catenary.meshgen.line import Line
@@ -49,196 +49,16 @@ _LIMITS = (
     (0.03, "at_tensioners", "3 % for the tensioner (Kiessling et al., section 6)"),
 )
 # Shares that differ by less are one: a tensioner keeps to the edge of its band.
-_SAME = 1e-6
-_OF = {"largest": "", "along": " along the wire", "at_tensioners": " at its tensioner"}
-
-
-def temperature_text(rests: Sequence[LineAtTemperature], ratio: float) -> str:
-    """The table over temperatures, and remarks on limits.
-
-    Parameters
-    ----------
-    ratio : travel of the weights over that of the wire
-    """
-    lines = [
-        f"{'dT [K]':>7} {'wire':22}{'least [N]':>10}{'most [N]':>10}{'along [%]':>10}"
-        f"{'tensioner [%]':>14}{'end [mm]':>10}{'weights [mm]':>13}"
-    ]
-    for rest in rests:
-        head = f"{rest.warmer:7g} "
-        if rest.why_not:
-            lines.append(f"{head}{rest.why_not}")
-            continue
-        for wire in rest.wires:
-            if wire.ends:
-                lines.append(head + _row(wire, ratio))
-                head = " " * 8
-    remarks = list(dict.fromkeys(_remarks(rests)))
-    if remarks:
-        return "\n".join([*lines, "", *remarks])
-    return "\n".join([*lines, "", "All changes of tension are within 10 %, and 8 % along a wire."])
-
-
-def _row(wire: WireAtRest, ratio: float) -> str:
-    moved = wire.moved[abs(wire.moved).argmax()]
-    tensioned = any(end.tensioned for end in wire.ends)
-    weights = f"{1e3 * ratio * moved:13.0f}" if tensioned else f"{'-':>13}"
-    own = f"{100 * wire.at_tensioners:14.2f}" if tensioned else f"{'-':>14}"
-    return (
-        f"{wire.name:22}{wire.tension.min():10.0f}{wire.tension.max():10.0f}"
-        f"{100 * wire.along:10.2f}{own}{1e3 * moved + 0.0:10.0f}{weights}"
-    )
-
-
-def _remarks(rests: Sequence[LineAtTemperature]) -> Iterator[str]:
-    """A sentence for each limit that a wire exceeds, at the temperature where it does so most."""
-    names = dict.fromkeys(wire.name for rest in rests for wire in rest.wires)
-    for name in names:
-        own = [(rest.warmer, wire) for rest in rests for wire in rest.wires if wire.name == name]
-        for limit, what, source in _LIMITS:
-            warmer, worst = max(own, key=lambda at: getattr(at[1], what))
-            value = getattr(worst, what)
-            if value > limit + _SAME:
-                yield (
-                    f"{name}: at {warmer:+g} K the tension changes by {100 * value:.1f} %"
-                    f"{_OF[what]}, more than {source}"
-                )
-
-
+_ALIKE = 1e-6
+_WHERE = {"largest": "", "along": " along the wire", "at_tensioners": " at its tensioner"}
 # Steps between temperatures [K], of which a range has no more than so many.
 _STEPS, _MOST_STEPS = (0.1, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0), 8
 # Differences that a scene may have [K].
 _LEAST, _MOST = -100.0, 150.0
-_EFFECTS = ("axial_motion", "temperature")
-
-
-def range_of(text: str) -> list[float]:
-    """The temperatures of "LOW,HIGH", differences from the installation (n,) [K].
-
-    Raises
-    ------
-    InputError
-        If the text is no ascending pair of numbers within what a scene may have.
-    """
-    try:
-        low, high = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(
-            f"--temperatures {text!r} must be two numbers, such as -20,40: the lowest and the "
-            "highest difference from the installation in K"
-        ) from None
-    if not _LEAST <= low < high <= _MOST:
-        raise InputError(
-            f"--temperatures {text} must ascend and lie between {_LEAST:g} and {_MOST:g} K"
-        )
-    step = next(step for step in _STEPS if high - low <= _MOST_STEPS * step)
-    between = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
-    found: list[float] = np.unique(np.concatenate([[low], between, [high]])).tolist()
-    return found
-
-
-def temperatures(scene: Scene, differences: Sequence[float], picture: Path | None) -> str:
-    """The table of a line over temperatures. Not collective.
-
-    ``differences`` are those from the installation [K]; ``picture`` is a new file, or None.
-
-    Raises
-    ------
-    InputError
-        If the scene does not let its wires move along the track.
-    RunBroken
-        If the picture cannot be written.
-    """
-    switches = scene.switches()
-    for name in _EFFECTS:
-        if not switches[name]:
-            raise InputError(
-                f"--temperatures needs effects.{name} = true, with what that needs of the scene; "
-                f"it is off {scene.origin.of(f'effects.{name}')}"
-            )
-    problem, mesh = problem_of(scene), mesh_of(scene)
-    rests = over_temperatures(problem, mesh, differences)
-    if picture is not None:
-        # Matplotlib takes long to import.
-        from catenary.postproc.files.disk import write_into
-        from catenary.postproc.report.pictures.figures import file_of
-        from catenary.postproc.report.pictures.line_pictures import draw_temperatures
-
-        drawn = file_of(draw_temperatures(rests), picture.name)
-        write_into(picture.parent, {picture.name: drawn})
-    return temperature_text(rests, problem.along.tensioner.ratio)
-
-
+_NEEDED = ("axial_motion", "temperature")
 DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
 DROPPER_WIRES = ("dropper_upper", "dropper_lower")
 _DROPPER_HEADS = ("span", "x_m", "length_m", "force_N", "from_wire", "to_wire")
-
-
-def installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:
-    """Names of the wires that droppers join, and lengths of wires between clamps.
-
-    Parameters
-    ----------
-    height : (n_nodes,) of the line at rest [m]
-
-    Returns
-    -------
-    ``line/dropper_upper``, ``line/dropper_lower`` : (n_droppers,) names of wires
-    ``static/lengths/NAME`` : length along each piece of a wire whose ends are clamped [m]
-    """
-    group = mesh.dropper_group
-    ends = (
-        ("upper", [own.upper for own in line.droppers]),
-        ("lower", [own.lower for own in line.droppers]),
-    )
-    found = {f"line/dropper_{end}": np.array(names, dtype=str)[group] for end, names in ends}
-    for wire in line.wires:
-        if all(End.CLAMPED in piece.ends for piece in wire.pieces):
-            nodes = mesh.wires[wire.name]
-            pieces = np.split(nodes, mesh.breaks.get(wire.name, np.zeros(0, dtype=int)))
-            lengths = [np.hypot(np.diff(mesh.x(own)), np.diff(height[own])).sum() for own in pieces]
-            found[f"static/lengths/{wire.name}"] = np.array(lengths)
-    return found
-
-
-def registration_of(mesh: LineMesh, form: Equilibrium) -> Registration | None:
-    """Steady arms at rest, None if wires do not move sideways, so that nothing pushes an arm."""
-    if form.lateral is None:
-        return None
-    x, nodes = mesh.x(mesh.steady_arms), mesh.steady_arms
-    return Registration(x, form.lateral.y[nodes], form.lateral.arm_force, form.lateral.arm_tension)
-
-
-def static_table(scene: Scene) -> dict[str, np.ndarray]:
-    """The line at rest, arrays named as in the result file's groups, and what `installed` adds.
-
-    Not collective.
-    """
-    problem = problem_of(scene)
-    mesh = mesh_of(scene)
-    rest = line_at_rest(problem, mesh)
-    data = {
-        **line_datasets(problem.line, mesh, problem.evaluation),
-        "static/dropper_length": lengths_to_cut(problem, mesh),
-        **static_datasets(rest.problem.line, mesh, rest.form, rest.lift),
-        "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
-        "line/arm_x": mesh.x(mesh.steady_arms),
-        **installed(problem.line, mesh, rest.form.height),
-    }
-    return {name.split("/", 1)[1]: values for name, values in data.items()}
-
-
-def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
-    """Text of the table: defects, droppers, registration, sag and elasticity; of a line that is
-    warmer than at its installation tensions along the section too. Not collective."""
-    problem = problem_of(scene)
-    defects = [fact["says"] for fact in defect_facts(scene, problem)]
-    strips = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
-    half_head = min((0.5 * length for length in strips if length is not None), default=None)
-    lines = [*defects, static_text(table, with_defects(problem).line, half_head)]
-    if problem.along.warmer and {"axial_motion", "temperature"} <= problem.effects:
-        lines += ["", temperatures(scene, [problem.along.warmer], None)]
-    return "\n".join(lines)
 
 
 class Checked(NamedTuple):
@@ -261,7 +81,7 @@ def check_line(scene: Scene) -> Checked:
     model, form = stable_form(problem, mesh)
     refuse_lost_wire(model, form)
     waves = arrival_facts(scene, problem)
-    arms = registration_of(mesh, form)
+    arms = _registration_of(mesh, form)
     sentences = [
         f"{scene.case.name} is valid: {counted(problem.line.n_spans, 'span')}, "
         f"{problem.line.support_positions[-1]:g} m, {counted(mesh.droppers.shape[0], 'dropper')}, "
@@ -292,6 +112,65 @@ def _at_stops(model: Model) -> list[str]:
     ]
 
 
+def _installed(line: Line, mesh: LineMesh, height: np.ndarray) -> dict[str, np.ndarray]:
+    """Names of the wires that droppers join, ``line/dropper_upper`` and ``line/dropper_lower``
+    (n_droppers,), and lengths along each piece of a wire whose ends are clamped,
+    ``static/lengths/NAME`` [m], of a line at rest with ``height`` (n_nodes,) [m]."""
+    group = mesh.dropper_group
+    ends = (
+        ("upper", [own.upper for own in line.droppers]),
+        ("lower", [own.lower for own in line.droppers]),
+    )
+    found = {f"line/dropper_{end}": np.array(names, dtype=str)[group] for end, names in ends}
+    for wire in line.wires:
+        if all(End.CLAMPED in piece.ends for piece in wire.pieces):
+            found[f"static/lengths/{wire.name}"] = np.array(
+                [
+                    np.hypot(np.diff(mesh.x(own)), np.diff(height[own])).sum()
+                    for own in mesh.pieces(wire.name)
+                ]
+            )
+    return found
+
+
+def _registration_of(mesh: LineMesh, form: Equilibrium) -> Registration | None:
+    """Steady arms at rest, None if wires do not move sideways, so that nothing pushes an arm."""
+    if form.lateral is None:
+        return None
+    x, nodes = mesh.x(mesh.steady_arms), mesh.steady_arms
+    return Registration(x, form.lateral.y[nodes], form.lateral.arm_force, form.lateral.arm_tension)
+
+
+def static_table(scene: Scene) -> dict[str, np.ndarray]:
+    """The line at rest, arrays named as in the result file's groups, and what `_installed` adds.
+
+    Not collective.
+    """
+    problem = problem_of(scene)
+    mesh = mesh_of(scene)
+    rest = line_at_rest(problem, mesh)
+    data = {
+        **line_datasets(problem.line, mesh, problem.evaluation),
+        "static/dropper_length": lengths_to_cut(problem, mesh),
+        **static_datasets(rest.problem.line, mesh, rest.form, rest.lift),
+        "line/dropper_x": mesh.x(mesh.droppers[:, 1]),
+        "line/arm_x": mesh.x(mesh.steady_arms),
+        **_installed(problem.line, mesh, rest.form.height),
+    }
+    return {name.split("/", 1)[1]: values for name, values in data.items()}
+
+
+def rest_text(scene: Scene, table: Mapping[str, np.ndarray]) -> str:
+    """Text of the table: defects, droppers, registration, sag and elasticity; of a line that is
+    warmer than at its installation tensions along the section too. Not collective."""
+    problem = problem_of(scene)
+    defects = [fact["says"] for fact in defect_facts(scene, problem)]
+    lines = [*defects, static_text(table, with_defects(problem).line, half_head_of(scene))]
+    if problem.along.warmer and problem.effects.issuperset(_NEEDED):
+        lines += ["", temperatures(scene, [problem.along.warmer], None)]
+    return "\n".join(lines)
+
+
 def write_static(path: Path, table: Mapping[str, Any], registration: bool = False) -> None:
     """Write the static table: the droppers as CSV, or the ``registration`` instead, or everything
     as JSON, by the file's suffix."""
@@ -313,3 +192,112 @@ def write_static(path: Path, table: Mapping[str, Any], registration: bool = Fals
     from catenary.postproc.files.disk import write_into  # loads HDF5
 
     write_into(path.parent, {path.name: text})
+
+
+def temperatures(scene: Scene, differences: Sequence[float], picture: Path | None) -> str:
+    """The table of a line over temperatures. Not collective.
+
+    ``differences`` are those from the installation [K]; ``picture`` is a new file, or None.
+
+    Raises
+    ------
+    InputError
+        If the scene does not let its wires move along the track.
+    RunBroken
+        If the picture cannot be written.
+    """
+    switches = scene.switches()
+    for name in _NEEDED:
+        if not switches[name]:
+            raise InputError(
+                f"--temperatures needs effects.{name} = true, with what that needs of the scene; "
+                f"it is off {scene.origin.of(f'effects.{name}')}"
+            )
+    problem, mesh = problem_of(scene), mesh_of(scene)
+    rests = over_temperatures(problem, mesh, differences)
+    if picture is not None:
+        # Matplotlib takes long to import.
+        from catenary.postproc.files.disk import write_into
+        from catenary.postproc.report.pictures.figures import file_of
+        from catenary.postproc.report.pictures.line_pictures import draw_temperatures
+
+        drawn = file_of(draw_temperatures(rests), picture.name)
+        write_into(picture.parent, {picture.name: drawn})
+    return temperature_text(rests, problem.along.tensioner.ratio)
+
+
+def range_of(text: str) -> list[float]:
+    """The temperatures of "LOW,HIGH", differences from the installation (n,) [K].
+
+    Raises
+    ------
+    InputError
+        If the text is no ascending pair of numbers within what a scene may have.
+    """
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(
+            f"--temperatures {text!r} must be two numbers, such as -20,40: the lowest and the "
+            "highest difference from the installation in K"
+        ) from None
+    if not _LEAST <= low < high <= _MOST:
+        raise InputError(
+            f"--temperatures {text} must ascend and lie between {_LEAST:g} and {_MOST:g} K"
+        )
+    step = next(step for step in _STEPS if high - low <= _MOST_STEPS * step)
+    between = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
+    found: list[float] = np.unique(np.concatenate([[low], between, [high]])).tolist()
+    return found
+
+
+def temperature_text(rests: Sequence[LineAtTemperature], ratio: float) -> str:
+    """The table over temperatures, and remarks on limits.
+
+    Parameters
+    ----------
+    ratio : travel of the weights over that of the wire
+    """
+    lines = [
+        f"{'dT [K]':>7} {'wire':22}{'least [N]':>10}{'most [N]':>10}{'along [%]':>10}"
+        f"{'tensioner [%]':>14}{'end [mm]':>10}{'weights [mm]':>13}"
+    ]
+    for rest in rests:
+        head = f"{rest.warmer:7g} "
+        if rest.why_not:
+            lines.append(f"{head}{rest.why_not}")
+            continue
+        for wire in rest.wires:
+            if wire.ends:
+                lines.append(head + _temperature_row(wire, ratio))
+                head = " " * 8
+    remarks = list(dict.fromkeys(_limit_remarks(rests)))
+    if remarks:
+        return "\n".join([*lines, "", *remarks])
+    return "\n".join([*lines, "", "All changes of tension are within 10 %, and 8 % along a wire."])
+
+
+def _temperature_row(wire: WireAtRest, ratio: float) -> str:
+    moved = wire.moved[abs(wire.moved).argmax()]
+    tensioned = any(end.tensioned for end in wire.ends)
+    weights = f"{1e3 * ratio * moved:13.0f}" if tensioned else f"{'-':>13}"
+    own = f"{100 * wire.at_tensioners:14.2f}" if tensioned else f"{'-':>14}"
+    return (
+        f"{wire.name:22}{wire.tension.min():10.0f}{wire.tension.max():10.0f}"
+        f"{100 * wire.along:10.2f}{own}{1e3 * moved + 0.0:10.0f}{weights}"
+    )
+
+
+def _limit_remarks(rests: Sequence[LineAtTemperature]) -> Iterator[str]:
+    """A sentence for each limit that a wire exceeds, at the temperature where it does so most."""
+    names = dict.fromkeys(wire.name for rest in rests for wire in rest.wires)
+    for name in names:
+        own = [(rest.warmer, wire) for rest in rests for wire in rest.wires if wire.name == name]
+        for limit, what, source in _LIMITS:
+            warmer, worst = max(own, key=lambda at: getattr(at[1], what))
+            value = getattr(worst, what)
+            if value > limit + _ALIKE:
+                yield (
+                    f"{name}: at {warmer:+g} K the tension changes by {100 * value:.1f} %"
+                    f"{_WHERE[what]}, more than {source}"
+                )

@@ -44,6 +44,12 @@ _BYTES, _FLAGS, _HEAD, _LINKS = 8, 4, 4, 32
 # Time that a step takes longer by itself, as on several ranks, than in a block of steps: measured
 # on lines of 25 to 1000 spans before and after there were blocks [s].
 _ONE_BY_ONE = 1e-5
+# Factor on the estimate of a job's time, the most that a start and a report take, and the
+# least that a job asks for [s].
+_SPARE, _AROUND, _LEAST = 3.0, 180.0, 600.0
+# Time before its limit at which a job gets the signal to end: a step, a flush and the report [s].
+NOTICE = 120
+_GB = 1e9
 
 
 class Wire(NamedTuple):
@@ -55,6 +61,11 @@ class Wire(NamedTuple):
     def message(self, n_bytes: float) -> float:
         """Time of a message [s]."""
         return self.latency + n_bytes * self.per_byte
+
+
+# Messages between nodes of a cluster, where they were not measured: 5 us and 5 GB/s, which today's
+# networks do better. They decide by how much ranks of short lines wait for each other.
+USUAL = Wire(5e-6, 2e-10)
 
 
 class Sizes(NamedTuple):
@@ -112,10 +123,10 @@ def work_of(scene: Scene) -> Work:
     """Work of a step of a scene, whose mesh it makes. Not collective."""
     problem, mesh = problem_of(scene), mesh_of(scene)
     n_unknowns = numbering_of(problem, mesh).n_unknowns
-    return work_in(problem, needs_with_mesh(scene, mesh), n_unknowns)
+    return _work_in(problem, needs_with_mesh(scene, mesh), n_unknowns)
 
 
-def work_in(problem: Problem, needs: Needs, n_unknowns: int) -> Work:
+def _work_in(problem: Problem, needs: Needs, n_unknowns: int) -> Work:
     """Work of a step of a problem: its time on one rank, by the estimate of ``catenary plan``, and
     its messages on several. Not collective."""
     n_spans = problem.line.n_spans
@@ -145,11 +156,6 @@ def predict(work: Work, wire: Wire, ranks: int) -> Predicted:
     )
 
 
-# Messages between nodes of a cluster, where they were not measured: 5 us and 5 GB/s, which today's
-# networks do better. They decide by how much ranks of short lines wait for each other.
-USUAL = Wire(5e-6, 2e-10)
-
-
 def march_on(problem: Problem, needs: Needs, n_unknowns: int, ranks: int) -> float:
     """Predicted time of a march on ``ranks`` ranks, each with a core of its own [s].
 
@@ -157,15 +163,7 @@ def march_on(problem: Problem, needs: Needs, n_unknowns: int, ranks: int) -> flo
     """
     if ranks == 1 or problem.window.moves:
         return needs.march
-    return needs.n_steps * predict(work_in(problem, needs, n_unknowns), USUAL, ranks).step
-
-
-# Factor on the estimate of a job's time, the most that a start and a report take, and the
-# least that a job asks for [s].
-_SPARE, _AROUND, _LEAST = 3.0, 180.0, 600.0
-# Time before its limit at which a job gets the signal to end: a step, a flush and the report [s].
-NOTICE = 120
-_GB = 1e9
+    return needs.n_steps * predict(_work_in(problem, needs, n_unknowns), USUAL, ranks).step
 
 
 @dataclass(frozen=True)
@@ -220,30 +218,20 @@ def slurm_script(
         If there are more nodes than ranks, or a directive is none.
     """
     return _SCRIPT.format(
-        options="\n".join(["#SBATCH --no-requeue", *directives_of(job, out, march_s, memory)]),
+        options="\n".join(["#SBATCH --no-requeue", *_directives_of(job, out, march_s, memory)]),
         before="".join(f"{line}\n" for line in job.before),
         out=shlex.quote(str(out.absolute())),
         words=" ".join(map(shlex.quote, words)),
-        petsc=after_dashes(petsc_options or []),
+        petsc=_after_dashes(petsc_options or []),
         chain=job.chain,
         ended=JOBS_ENDED,
     )
 
 
-def directives_of(job: SlurmJob, out: Path, march_s: float, memory: float) -> list[str]:
-    """The lines for sbatch at the head of a script. Not collective.
-
-    Parameters
-    ----------
-    out : folder of the results, whose name the job takes
-    march_s : estimate of the marches on all its ranks [s]
-    memory : estimate of the node that takes most, beside libraries [B]
-
-    Raises
-    ------
-    InputError
-        If there are more nodes than ranks, or a directive is none.
-    """
+def _directives_of(job: SlurmJob, out: Path, march_s: float, memory: float) -> list[str]:
+    """The lines for sbatch at the head of a script whose job takes the name of the folder ``out``;
+    the march is estimated to take so long on all its ranks [s], and the node that takes most so
+    much memory beside libraries [B]."""
     if job.nodes > job.ranks:
         raise InputError(f"--nodes is {job.nodes}, more than the {job.ranks} ranks of --ranks")
     for directive in job.directives:
@@ -269,7 +257,7 @@ def directives_of(job: SlurmJob, out: Path, march_s: float, memory: float) -> li
     return [f"#SBATCH {option}" for option in options]
 
 
-def after_dashes(petsc_options: Sequence[str]) -> str:
+def _after_dashes(petsc_options: Sequence[str]) -> str:
     """Options for PETSc as the end of a command of a shell."""
     return " " + " ".join(map(shlex.quote, ["--", *petsc_options])) if petsc_options else ""
 
@@ -335,19 +323,19 @@ def array_script(
     Raises
     ------
     InputError
-        If there are more tasks than runs, or what ``directives_of`` refuses.
+        If there are more tasks than runs, or what ``_directives_of`` refuses.
     """
     if n_tasks > needs.n_runs:
         raise InputError(f"--array is {n_tasks}, more than the {needs.n_runs} runs")
     total, longest = needs.march
     march = max(longest, total / n_tasks / job.ranks)
-    options = directives_of(job, out, march, needs.memory * job.a_node)
+    options = _directives_of(job, out, march, needs.memory * job.a_node)
     return _ARRAY_SCRIPT.format(
         options="\n".join([f"#SBATCH --array=1-{n_tasks}", "#SBATCH --requeue", *options]),
         before="".join(f"{line}\n" for line in job.before),
         out=shlex.quote(str(out.absolute())),
         words=" ".join(map(shlex.quote, words)),
-        petsc=after_dashes(petsc_options),
+        petsc=_after_dashes(petsc_options),
         ranks=job.ranks,
         n_tasks=n_tasks,
         chain=job.chain,

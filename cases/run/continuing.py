@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from h5py import h5f
 
 from catenary.base.errors import InputError
 from catenary.base.files import is_there
@@ -85,7 +86,6 @@ def state_to_continue(result: Path, beyond_end: bool = False) -> dict[str, Any]:
 
 def _refuse_open(file: Path) -> None:
     """Raise InputError if this process reads a file, to which HDF5 then does not write."""
-    from h5py import h5f
 
     names = [os.fsdecode(h5f.get_name(one)) for one in h5f.get_obj_ids(types=h5f.OBJ_FILE)]
     there = filter(os.path.exists, names) if is_there(file) else ()

@@ -41,6 +41,12 @@ from catenary.solver.problem.problem import Placement, Problem
 if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
 
+_IRREGULARITIES = {
+    "contact_wire_height": "droppers are cut for irregular heights of the contact wire",
+    "running_surface": "running surface of the contact wire",
+    "dropper_lengths": "errors of the droppers' lengths",
+}
+
 
 def description_of(data: PantographData, static_force: float) -> str:
     """A line about a pantograph."""
@@ -140,7 +146,7 @@ def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
         if name in problem.effects:
             table = getattr(scene.irregularities, name)
             sentence = _lengths(table) if isinstance(table, LengthsTable) else _heights(table, line)
-            found.append({"type": name, "says": f"{_WHAT[name]}: {sentence}"})
+            found.append({"type": name, "says": f"{_IRREGULARITIES[name]}: {sentence}"})
     for fitting in scene.line.fittings if "fittings" in problem.effects else []:
         over = f" over {fitting.length_m:g} m" if fitting.length_m else ""
         sentence = f"{fitting.kind.replace('_', ' ')} of {fitting.mass_kg:g} kg{over} on the "
@@ -151,13 +157,6 @@ def defect_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
         if defect.type in problem.effects:
             found.append({"type": defect.type, **_defect(defect, line)})
     return found
-
-
-_WHAT = {
-    "contact_wire_height": "droppers are cut for irregular heights of the contact wire",
-    "running_surface": "running surface of the contact wire",
-    "dropper_lengths": "errors of the droppers' lengths",
-}
 
 
 def _heights(table: HeightTable, line: Line) -> str:
@@ -191,7 +190,7 @@ def _lengths(table: LengthsTable) -> str:
 def _defect(table: Defect, line: Line) -> dict[str, Any]:
     match table:
         case MissingDropperTable() | LooseClampTable():
-            at, which = _dropper(line, table.span, table.dropper)
+            at, which = _dropper_of_span(line, table.span, table.dropper)
             missing = isinstance(table, MissingDropperTable)
             what = "is missing" if missing else "has a loose clamp and carries nothing"
             wire = line.wires_of(Role.CONTACT)[0].name
@@ -230,8 +229,8 @@ def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
         {
             "type": table.type,
             "time_s": at_step(table.at_s, dt),
-            **_place(table, problem.line),
-            "says": _sentence(table, problem),
+            **_incident_place(table, problem.line),
+            "says": _incident(table, problem),
         }
         for table in scene.incidents
         if table.type in problem.effects
@@ -239,22 +238,22 @@ def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
     return sorted(found, key=lambda fact: float(str(fact["time_s"])))
 
 
-def _dropper(line: Line, span: int, number: int) -> tuple[dict[str, float], str]:
+def _dropper_of_span(line: Line, span: int, number: int) -> tuple[dict[str, float], str]:
     """Place of a dropper [m] and which it is of those there, and both in words."""
     x, nth = line.dropper_of_span(span, number)
     return {"at_m": x, "nth": nth}, f"dropper {number} of span {span}, at {x:g} m"
 
 
-def _place(table: Incident, line: Line) -> dict[str, float]:
+def _incident_place(table: Incident, line: Line) -> dict[str, float]:
     if not isinstance(table, DropperBreakTable):
         return {}
-    return _dropper(line, table.span, table.dropper)[0]
+    return _dropper_of_span(line, table.span, table.dropper)[0]
 
 
-def _sentence(table: Incident, problem: Problem) -> str:
+def _incident(table: Incident, problem: Problem) -> str:
     line = problem.line
     if isinstance(table, DropperBreakTable):
-        return f"{_dropper(line, table.span, table.dropper)[1]}, breaks"
+        return f"{_dropper_of_span(line, table.span, table.dropper)[1]}, breaks"
     if isinstance(table, TensionLossTable):
         left = table.share * line.wire(table.wire).tension / 1e3
         name = wire_words(table.wire)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catenary.base.errors import CatenaryError, RunBroken
+from catenary.base.mpi import MPI
 from catenary.base.parallel import on_root
 from catenary.base.petsc import PETSc
 from catenary.base.process import give_back
@@ -41,6 +42,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.channels.header import Header
 from catenary.postproc.files.committed_rows import ForceFilter
 from catenary.postproc.files.own_files import RUN_FILE, remove_stale
+from catenary.postproc.files.result_file import BEGUN_FOR, CHANGED, extend_run
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.run_watch import RunWatch, StripWatch
@@ -213,7 +215,6 @@ def _on_as_many(scene: Scene, comm: Any, run: Callable[[Any], RunOutcome]) -> Ru
     """
     if comm.size == 1 or scene.window.mode == OFF:
         return run(comm)
-    from catenary.base.mpi import MPI
 
     if comm.rank == 0:
         _warn_of_idle(scene.window.mode, comm.size - 1)
@@ -469,7 +470,6 @@ def _refuse_other_run(
     order: _Order, header: Header | None, problem: Problem, at_rest: LineAtRest
 ) -> None:
     from catenary.cases.run.continuing import refuse_other_run, refuse_other_state
-    from catenary.postproc.files.result_file import CHANGED
 
     assert header is not None and order.state is not None
     n_strips = tuple(len(place.data.strips.offsets) for place in problem.train.placements)
@@ -478,7 +478,6 @@ def _refuse_other_run(
 
 
 def _extend_run(order: _Order, header: Header | None, n_steps: int) -> None:
-    from catenary.postproc.files.result_file import extend_run
 
     assert header is not None
     extend_run(order.result, header, n_steps)
@@ -488,7 +487,6 @@ def _begun_for(order: _Order) -> int | None:
     """Steps for which a run was begun that got a later end, None if it did not."""
     if not order.resume:
         return None
-    from catenary.postproc.files.result_file import BEGUN_FOR
     from catenary.postproc.read.results import Results
 
     with Results(order.result) as results:

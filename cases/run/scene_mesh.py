@@ -11,7 +11,8 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.cases.result_folder.output_folder import new_file
 from catenary.cases.scene.checks.mesh_size import MANY_NODES, size_of
-from catenary.cases.scene.scene import Scene, line_of
+from catenary.cases.scene.line.line_data import overlaps_of
+from catenary.cases.scene.scene import Scene, line_of, problem_of
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.mesh import LineMesh
 
@@ -80,7 +81,6 @@ def draw_scene(scene: Scene, path: Path, force: bool) -> tuple[float, float]:
         If the disk refuses.
     """
     new_file(path, DRAWN, force)
-    from catenary.cases.scene.scene import problem_of
     from catenary.postproc.files.disk import write_into
     from catenary.postproc.report.pictures.figures import file_of
     from catenary.solver.statics.form_finding import find_form
@@ -102,7 +102,6 @@ def line_figure(
     """
     # Matplotlib takes long to import.
     from catenary.cases.run.description import defect_facts
-    from catenary.cases.scene.line.line_data import overlaps_of
     from catenary.postproc.report.pictures.line_drawing import Mark, draw_line
 
     line, masts = problem.line, problem.line.support_positions
@@ -115,11 +114,15 @@ def line_figure(
         middle = int(np.clip(judged, first, last - 1))
         spans = max(middle - 1, 0), min(middle + 2, line.n_spans)
     stretch = float(masts[spans[0]]), float(masts[spans[1]])
-    lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
-    known = [0.5 * length for length in lengths if length is not None]
     marks = [
         Mark(fact["at_m"], fact["wire"], fact["says"])
         for fact in defect_facts(scene, problem)
         if "at_m" in fact
     ]
-    return draw_line(line, mesh, form, stretch, min(known, default=None), marks), stretch
+    return draw_line(line, mesh, form, stretch, half_head_of(scene), marks), stretch
+
+
+def half_head_of(scene: Scene) -> float | None:
+    """Half of the shortest strip on the train [m], None where no length is known."""
+    lengths = [scene.pantographs[place.name].strips.length_m for place in scene.train.pantographs]
+    return min((0.5 * length for length in lengths if length is not None), default=None)

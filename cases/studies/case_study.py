@@ -35,6 +35,7 @@ from catenary.cases.studies.sweep.jobs import (
     make_jobs,
 )
 from catenary.cases.studies.sweep.variants import Variant, slug
+from catenary.postproc.report.study_table import write_files
 
 if TYPE_CHECKING:
     from catenary.postproc.read.results import Results
@@ -151,7 +152,6 @@ def _measured(path: Path, results: Results) -> dict[str, Any]:
 def _conclude(plan: Plan, out_dir: Path, ended: Sequence[Ended], begin: float) -> str:
     from catenary.cases.studies.sweep import output as sweep_output
     from catenary.postproc.report.study_report import verdict_text, write_study
-    from catenary.postproc.report.study_table import write_files
 
     runs = {
         one.variant.name: StudyRun(one, job.scene, out_dir / RUNS / one.variant.name)

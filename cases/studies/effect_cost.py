@@ -24,7 +24,7 @@ from catenary.cases.process.interrupts import Phase
 from catenary.cases.run.prepared import rest_of
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
 from catenary.cases.scene.input.case_files import Assigned
-from catenary.cases.scene.input.faults import shown
+from catenary.cases.scene.input.faults import shown_word
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene, end_of, problem_of
 from catenary.cases.studies.sweep.jobs import (
@@ -44,124 +44,31 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.time_loop.march import March
 from catenary.solver.time_loop.views.observers import NEVER, Observer, StepView
 
-
-class Size(NamedTuple):
-    """Unknowns of a line, of its stations (fewest, most), and of a cross-section by planes."""
-
-    n_unknowns: int
-    of_a_station: tuple[int, int]
-    planes: tuple[int, ...]
-
-
-class RepeatedMarch:
-    """A march over some steps that starts again and again from one of its states.
-
-    Collective to make. A context manager that destroys the march.
-
-    Parameters
-    ----------
-    comm : mpi4py communicator
-    at_rest : line that is marched
-    first : step from which rounds start, which the march runs to once
-    n_steps : of a round; those to the end of the run if there are fewer
-
-    Raises
-    ------
-    RunBroken
-        If the march does not come to the end of the first round.
-    """
-
-    def __init__(self, comm: Any, at_rest: LineAtRest, first: int = 0, n_steps: int = NEVER):
-        problem = at_rest.problem
-        train, dt = problem.train, problem.numerics.dt
-        last = min(first + n_steps, steps_of(problem))
-        if last < steps_of(problem):
-            end = train.start + (last + 0.5) * dt * train.speed
-            problem = replace(problem, train=replace(train, end=end))
-        self._comm = comm
-        self._march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
-        numbering = at_rest.model.numbering
-        of_stations = list(map(len, numbering.station_types))
-        fewest_and_most = min(of_stations), max(of_stations)
-        self.size = Size(numbering.n_unknowns, fewest_and_most, self._march.station_widths)
-        kept = _Kept(first)
-        outcome = self._march.run([kept])
-        if outcome.outcome != "done":
-            self._march.destroy()
-            raise RunBroken(outcome.outcome)
-        self._state = comm.bcast(kept.state)
-
-    def step_cost(self) -> float:
-        """Time of a step of one more round [us], on the slowest rank. Collective."""
-        self._march.restore(self._state)
-        outcome = self._march.run([])
-        cost = 1e6 * outcome.wall / max(1, outcome.n_steps)
-        return float(max(self._comm.allgather(cost)))
-
-    def destroy(self) -> None:
-        """Collective."""
-        self._march.destroy()
-
-    def __enter__(self) -> RepeatedMarch:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.destroy()
-
-
-class _Kept(Observer):
-    """Observer that keeps the state of one step."""
-
-    def __init__(self, step: int) -> None:
-        self._step = step
-        self.state: dict[str, Any] | None = None
-
-    def next_state(self, step: int) -> int:
-        """The step that is kept, then none."""
-        return self._step if step < self._step else NEVER
-
-    def observe(self, view: StepView) -> None:
-        """Keep the state of the step."""
-        if view.step == self._step:
-            self.state = view.checkpoint()
-
-
-class Beside(NamedTuple):
-    """Steps of a march beside those of another: least times [us], and their ratio."""
-
-    least: float
-    least_of_other: float
-    ratio: float
-
-
-def beside(march: RepeatedMarch, other: RepeatedMarch, rounds: int) -> Beside:
-    """Time of steps of a march over the time of steps of an ``other`` one. Collective.
-
-    A round marches both twice, as in a b b a, and takes the lesser of each. The ratio is the median
-    of rounds: where the machine slows down for some of them, it does so for both.
-    """
-    found = np.empty((rounds, 2))
-    for number in range(rounds):
-        a, b, again, last = (m.step_cost() for m in (march, other, other, march))
-        found[number] = min(a, last), min(b, again)
-    least = found.min(axis=0)
-    return Beside(float(least[0]), float(least[1]), float(np.median(found[:, 0] / found[:, 1])))
-
-
-def in_turns(marches: Mapping[str, RepeatedMarch], rounds: int) -> dict[str, float]:
-    """Least time of a step of each of several marches, by name [us]. Collective.
-
-    In each of ``rounds`` rounds the marches take turns.
-    """
-    least = dict.fromkeys(marches, np.inf)
-    for _ in range(rounds):
-        for name, march in marches.items():
-            least[name] = min(least[name], march.step_cost())
-    return least
-
-
 # Data that an effect lacks, if it does not name them itself.
 _NO_DATA = "the scene has no data for it"
+# The scene as it is, among the names of runs: no effect has a hyphen in its name.
+AS_IT_IS = "as-it-is"
+# Steps of a round at least, some milliseconds, and at most; a span between them.
+_FEWEST, _MOST = 200, 4000
+# The statistics that are compared, of a pantograph and of the line.
+FIGURES = ("mean_N", "std_N", "max_N", "min_N")
+UPLIFT = "max_uplift_mm"
+TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
+# In the column "simulated": the scene simulates the effect.
+LEFT_OUT = "left out"
+# Heads of the figures in a table, and their names in sentences.
+_HEADS = {"mean_N": "mean", "std_N": "sigma", "max_N": "max", "min_N": "min", UPLIFT: "uplift"}
+# A ratio of times that is none: what clocks and caches make of equal steps.
+_SAME_COST = 0.03
+# A share of a figure below which digits are noise of no use to anybody.
+_NOTHING = 5e-5
+_WORDS = {
+    "mean_N": "the mean",
+    "std_N": "sigma",
+    "max_N": "the maximum",
+    "min_N": "the minimum",
+    UPLIFT: "the uplift",
+}
 
 
 @dataclass(frozen=True)
@@ -244,15 +151,6 @@ def _taken_along(name: str, among: Iterable[str], takes: Callable[[str, str], bo
         found.update(new)
         ahead += new
     return [other for other in left if other in found]
-
-
-# The scene as it is, among the names of runs: no effect has a hyphen in its name.
-AS_IT_IS = "as-it-is"
-# Steps of a round at least, some milliseconds, and at most; a span between them.
-_FEWEST, _MOST = 200, 4000
-# The statistics that are compared, of a pantograph and of the line.
-FIGURES = ("mean_N", "std_N", "max_N", "min_N")
-UPLIFT = "max_uplift_mm"
 
 
 @dataclass(frozen=True)
@@ -371,8 +269,9 @@ def _named(effects: SwitchableEffects, names: Sequence[str]) -> list[Switch]:
         if name in effects.always:
             raise InputError(f"--only {name}: it is part of every scene and cannot be left out")
         if name not in known:
-            told = shown(name)[1:-1] or shown(name)
-            raise InputError(f"--only {told} is no effect; there are {', '.join(known)}")
+            raise InputError(
+                f"--only {shown_word(name)} is no effect; there are {', '.join(known)}"
+            )
     return [known[name] for name in dict.fromkeys(names)]
 
 
@@ -472,22 +371,119 @@ def _round_of(problem: Problem) -> tuple[int, int]:
     return first, min(n_steps, steps_of(problem) - first)
 
 
-TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
-# In the column "simulated": the scene simulates the effect.
-LEFT_OUT = "left out"
-# Heads of the figures in a table, and their names in sentences.
-_HEADS = {"mean_N": "mean", "std_N": "sigma", "max_N": "max", "min_N": "min", UPLIFT: "uplift"}
-# A ratio of times that is none: what clocks and caches make of equal steps.
-_SAME_COST = 0.03
-# A share of a figure below which digits are noise of no use to anybody.
-_NOTHING = 5e-5
-_WORDS = {
-    "mean_N": "the mean",
-    "std_N": "sigma",
-    "max_N": "the maximum",
-    "min_N": "the minimum",
-    UPLIFT: "the uplift",
-}
+class Size(NamedTuple):
+    """Unknowns of a line, of its stations (fewest, most), and of a cross-section by planes."""
+
+    n_unknowns: int
+    of_a_station: tuple[int, int]
+    planes: tuple[int, ...]
+
+
+class RepeatedMarch:
+    """A march over some steps that starts again and again from one of its states.
+
+    Collective to make. A context manager that destroys the march.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+    at_rest : line that is marched
+    first : step from which rounds start, which the march runs to once
+    n_steps : of a round; those to the end of the run if there are fewer
+
+    Raises
+    ------
+    RunBroken
+        If the march does not come to the end of the first round.
+    """
+
+    def __init__(self, comm: Any, at_rest: LineAtRest, first: int = 0, n_steps: int = NEVER):
+        problem = at_rest.problem
+        train, dt = problem.train, problem.numerics.dt
+        last = min(first + n_steps, steps_of(problem))
+        if last < steps_of(problem):
+            end = train.start + (last + 0.5) * dt * train.speed
+            problem = replace(problem, train=replace(train, end=end))
+        self._comm = comm
+        self._march = March(comm, problem, at_rest.model, at_rest.form, at_rest.lift)
+        numbering = at_rest.model.numbering
+        of_stations = list(map(len, numbering.station_types))
+        fewest_and_most = min(of_stations), max(of_stations)
+        self.size = Size(numbering.n_unknowns, fewest_and_most, self._march.station_widths)
+        kept = _Kept(first)
+        outcome = self._march.run([kept])
+        if outcome.outcome != "done":
+            self._march.destroy()
+            raise RunBroken(outcome.outcome)
+        self._state = comm.bcast(kept.state)
+
+    def step_cost(self) -> float:
+        """Time of a step of one more round [us], on the slowest rank. Collective."""
+        self._march.restore(self._state)
+        outcome = self._march.run([])
+        cost = 1e6 * outcome.wall / max(1, outcome.n_steps)
+        return float(max(self._comm.allgather(cost)))
+
+    def destroy(self) -> None:
+        """Collective."""
+        self._march.destroy()
+
+    def __enter__(self) -> RepeatedMarch:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.destroy()
+
+
+class _Kept(Observer):
+    """Observer that keeps the state of one step."""
+
+    def __init__(self, step: int) -> None:
+        self._step = step
+        self.state: dict[str, Any] | None = None
+
+    def next_state(self, step: int) -> int:
+        """The step that is kept, then none."""
+        return self._step if step < self._step else NEVER
+
+    def observe(self, view: StepView) -> None:
+        """Keep the state of the step."""
+        if view.step == self._step:
+            self.state = view.checkpoint()
+
+
+class Beside(NamedTuple):
+    """Steps of a march beside those of another: least times [us], and their ratio."""
+
+    least: float
+    least_of_other: float
+    ratio: float
+
+
+def beside(march: RepeatedMarch, other: RepeatedMarch, rounds: int) -> Beside:
+    """Time of steps of a march over the time of steps of an ``other`` one. Collective.
+
+    A round marches both twice, as in a b b a, and takes the lesser of each. The ratio is the median
+    of rounds: where the machine slows down for some of them, it does so for both.
+    """
+    found = np.empty((rounds, 2))
+    for number in range(rounds):
+        a, b, again, last = (m.step_cost() for m in (march, other, other, march))
+        found[number] = min(a, last), min(b, again)
+    least = found.min(axis=0)
+    return Beside(float(least[0]), float(least[1]), float(np.median(found[:, 0] / found[:, 1])))
+
+
+def in_turns(marches: Mapping[str, RepeatedMarch], rounds: int) -> dict[str, float]:
+    """Least time of a step of each of several marches, by name [us]. Collective.
+
+    In each of ``rounds`` rounds the marches take turns.
+    """
+    least = dict.fromkeys(marches, np.inf)
+    for _ in range(rounds):
+        for name, march in marches.items():
+            least[name] = min(least[name], march.step_cost())
+    return least
 
 
 class Change(NamedTuple):
@@ -502,7 +498,7 @@ class Change(NamedTuple):
     share: float
 
 
-def changes(found: Costs, row: Measured) -> list[Change]:
+def _changes(found: Costs, row: Measured) -> list[Change]:
     """Changes of all figures of all pantographs by the switch of a ``row``; unknown figures are
     left out."""
     result = []
@@ -525,9 +521,9 @@ def _share(before: dict[str, Any], after: dict[str, Any], name: str) -> float | 
     return float((b - a) / abs(of))
 
 
-def largest(found: Costs, row: Measured) -> Change | None:
+def _largest(found: Costs, row: Measured) -> Change | None:
     """The largest change by the switch of a ``row``, None without figures."""
-    return max(changes(found, row), key=lambda change: abs(change.share), default=None)
+    return max(_changes(found, row), key=lambda change: abs(change.share), default=None)
 
 
 def advice(found: Costs, row: Measured) -> str:
@@ -535,7 +531,7 @@ def advice(found: Costs, row: Measured) -> str:
     verb = "leave it out" if row.switch.on else "switch it on"
     if not row.done:
         return f"it was not measured, for you cannot {verb} here: {row.outcome.rstrip('.')}."
-    change = largest(found, row)
+    change = _largest(found, row)
     if change is None:
         return f"it {_price(row.cost)}; the stretch gives no figures to compare."
     what = _words(found, change)
@@ -595,7 +591,7 @@ def as_text(found: Costs, *, whole: bool = False) -> str:
         lines.append(f"Forces are those of {found.names[0]}, which leads.")
     lines += ["", leading.text(whole=whole), "", "Advice:"]
     width = max(len(row.switch.name) for row in found.rows) if found.rows else 0
-    lines += [f"  {row.switch.name:{width}}  {sentence(found, row)}" for row in found.rows]
+    lines += [f"  {row.switch.name:{width}}  {_sentence(found, row)}" for row in found.rows]
     remarks = remark_lines((_run(one), one.remarks) for one in (found.as_it_is, *found.rows))
     lines += ["", *remarks] if remarks else []
     if found.options.only:
@@ -649,7 +645,7 @@ def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
         "cost": None if not (switch.name and one.done) else one.cost,
         "from_m": found.stretch[0],
         "to_m": found.stretch[1],
-        "advice": sentence(found, one) if switch.name else "",
+        "advice": _sentence(found, one) if switch.name else "",
         "remarks": one.remarks,
     }
     rows = []
@@ -673,7 +669,7 @@ def _run(row: Measured) -> str:
     return f"{'without' if row.switch.on else 'with'} {row.switch.name}"
 
 
-def sentence(found: Costs, row: Measured) -> str:
+def _sentence(found: Costs, row: Measured) -> str:
     """The advice on the effect of a ``row``, and the effects that are switched with it."""
     text = advice(found, row)
     if not row.switch.together:

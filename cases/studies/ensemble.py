@@ -26,7 +26,7 @@ from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.verdict import criteria_of
-from catenary.postproc.files.committed_rows import PATH as FILTERED
+from catenary.postproc.files.committed_rows import FILTERED_FORCE
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.result_tables import MarchedFile
 from catenary.postproc.read.results import Results
@@ -365,7 +365,7 @@ def _tables(history: SceneHistory) -> tuple[dict[str, np.ndarray], dict[str, np.
         "channels/contact_force": history.contact_force,
         "channels/head_height": history.head_height,
         "channels/wire_height": history.wire_height,
-        FILTERED: filters.low_pass(history.contact_force, dt),
+        FILTERED_FORCE: filters.low_pass(history.contact_force, dt),
     }
     uplift = np.stack([np.full(history.uplift.size, np.nan), history.uplift])
     return tables, {"arm_uplift": uplift, "dropper_force": history.dropper_force}
@@ -387,12 +387,12 @@ def _alone(line: _Line, number: int, scene: Scene, problem: Problem, rest: LineA
     head = line.header(scene, problem, rest)
     head = replace(head, attributes={**head.attributes, "watched": watch.facts()})
     tables = keeper.tables()
-    tables[FILTERED] = filters.low_pass(tables["channels/contact_force"], dt)
+    tables[FILTERED_FORCE] = filters.low_pass(tables["channels/contact_force"], dt)
     return _done(number, head, tables, keeper.extremes())
 
 
 def _done(
     number: int, head: Header, tables: dict[str, np.ndarray], extremes: dict[str, np.ndarray]
 ) -> Marched:
-    file = MarchedFile(head, tables, extremes, {FILTERED: filters.ABOUT})
+    file = MarchedFile(head, tables, extremes, {FILTERED_FORCE: filters.ABOUT})
     return Marched(number, DONE, Results.of(file), tables)

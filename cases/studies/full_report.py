@@ -88,6 +88,14 @@ _COLUMNS = {
     "force_min": "error_min_N",
     "arm_uplift": "error_uplift_mm",
 }
+# Places along the track closer than this are one, contact wires whose heights differ less are met
+# together [m].
+_OFF, _ALIKE = 1e-6, 1e-3
+# Length that is shown beside a dropper and its extreme [m], and number of places in tables.
+_BESIDE, _MOST = 30.0, 5
+_HEADING = "Validation by EN 50318"
+# Snapshots times length of the line [m] of a picture that is quickly drawn.
+_LARGEST = 1e7
 
 
 class SceneOfRun:
@@ -212,11 +220,6 @@ def _rows_of(path: Path, verb: str, scene: Scene) -> list[dict[str, Any]]:
     return rows
 
 
-# Places along the track closer than this are one, contact wires whose heights differ less are met
-# together [m].
-_OFF, _ALIKE = 1e-6, 1e-3
-
-
 def line_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     """The line to scale, and what it is made of."""
     rest = scene.at_rest
@@ -229,7 +232,7 @@ def line_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
 
 def _line_blocks(problem: Problem, rest: LineAtRest) -> Iterator[StudyTable]:
     line, damping = problem.line, simulated(problem).damping
-    rows, bending = [], _alike([wire.bending_stiffness for wire in line.wires])
+    rows, bending = [], _with_equal_decimals([wire.bending_stiffness for wire in line.wires])
     for wire, stiffness in zip(line.wires, bending, strict=True):
         alpha, beta = damping.per_component.get(wire.name, (damping.alpha, damping.beta))
         rows.append([
@@ -375,17 +378,17 @@ def _range(values: np.ndarray, digits: int) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _alike(values: Sequence[float]) -> list[str]:
+def _with_equal_decimals(values: Sequence[float]) -> list[str]:
     """Figures of a column, with the decimals that the one with most of them has."""
     decimals = max(len(f"{value:.9g}".partition(".")[2]) for value in values)
     return [number(value, decimals) for value in values]
 
 
-def _plain(name: str) -> str:
+def _spaced(name: str) -> str:
     return name.replace("_", " ")
 
 
-def pantographs_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
+def _pantographs_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     """Each kind of pantograph of the train: its data, and the pantograph drawn to scale."""
     kinds: dict[str, tuple[Placement, str]] = {}
     words = header_words(scene.scene, scene.problem)
@@ -398,8 +401,8 @@ def pantographs_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
             length = "assumed" if placement.data.strips.length is None else "to scale"
             how = "sketched from the side and from the front: "
             how += f"springs and arms are schematic, the strips' length is {length}"
-        text = f"Pantograph {_plain(name)}, {how}."
-        pictures.append(Picture(file, text, partial(_drawn_pantograph, placement.data)))
+        text = f"Pantograph {_spaced(name)}, {how}."
+        pictures.append(Picture(file, text, partial(_draw_pantograph, placement.data)))
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
 
 
@@ -407,10 +410,10 @@ def _pantograph_blocks(
     kinds: dict[str, tuple[Placement, str]],
 ) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
-        yield Text(f"{description}.", "", f"{_plain(name)}:")
+        yield Text(f"{description}.", "", f"{_spaced(name)}:")
         data = placement.data
         if isinstance(data, LumpedData):
-            columns = map(_alike, (data.masses, data.stiffnesses, data.dampings))
+            columns = map(_with_equal_decimals, (data.masses, data.stiffnesses, data.dampings))
             rows = [
                 [f"{n}{' (head)' if n == 1 else ''}", *own]
                 for n, own in enumerate(zip(*columns, strict=True), start=1)
@@ -418,7 +421,7 @@ def _pantograph_blocks(
             heads = ["mass", "mass [kg]", "stiffness below [N/m]", "damping below [N s/m]"]
             yield texts_table(heads, rows, {1, 2, 3})
         else:
-            rows = [[_plain(body.name), f"{body.mass:g}", *(f"{i:g}" for i in body.inertia)]
+            rows = [[_spaced(body.name), f"{body.mass:g}", *(f"{i:g}" for i in body.inertia)]
                     for body in data.system.bodies]  # fmt: skip
             heads = ["body", "mass [kg]", "Ixx [kg m²]", "Iyy [kg m²]", "Izz [kg m²]"]
             yield texts_table(heads, rows, {1, 2, 3, 4})
@@ -439,7 +442,7 @@ def _pantograph_blocks(
 
 
 @own_style()
-def _drawn_pantograph(data: Any) -> Figure:
+def _draw_pantograph(data: Any) -> Figure:
     """A pantograph from the side and from the front, heights above its base."""
     shape = shape_of(data)
     n_places = data.n_masses if isinstance(data, LumpedData) else 1
@@ -461,17 +464,9 @@ def _drawn_pantograph(data: Any) -> Figure:
     return figure
 
 
-# Length that is shown beside a dropper and its extreme [m], and number of places in tables.
-_BESIDE, _MOST = 30.0, 5
-
-
-def worst_section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
-    """The worst places of the evaluated stretch.
-
-    Parameters
-    ----------
-    scene : of the run, for the elasticity of its line and its gusts; None if it is not known
-    """
+def _worst_section(scene: SceneOfRun | None, run: EvaluatedRun) -> Section:
+    """The worst places of the evaluated stretch; without a scene nothing is known of the elasticity
+    of the line and of gusts."""
     results, places = run.results, worst_places(run.results)
     causes = Causes(results, places.passages, None if scene is None else scene.at_rest)
     return Section(
@@ -511,18 +506,18 @@ def _worst_pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
             f"Contact force of {in_sentence(who)} in the worst span and the two beside it, and "
             "height of the contact wire above the rail."
         )
-        yield Picture("worst_span", text, lambda: _span(results, passage))
+        yield Picture("worst_span", text, lambda: _draw_span(results, passage))
     for name, spots, what in (
         ("worst_dropper", places.forces, "Force of the dropper with the largest force"),
         ("longest_slack", places.slack, "Force of the dropper that is slack the longest"),
     ):
         for spot in spots[:1]:
             caption = f"{what}, {spot.place}, as the train passes."
-            yield Picture(name, caption, partial(_passage, results, spot))
+            yield Picture(name, caption, partial(_draw_passage, results, spot))
 
 
 @own_style()
-def _span(results: Results, passage: Passage) -> Figure:
+def _draw_span(results: Results, passage: Passage) -> Figure:
     """Contact force, and height of the contact point, in a span with those beside it."""
     length = passage.end - passage.start
     low, high = passage.start - length, passage.end + length
@@ -561,7 +556,7 @@ def _span(results: Results, passage: Passage) -> Figure:
 
 
 @own_style()
-def _passage(results: Results, spot: Spot) -> Figure:
+def _draw_passage(results: Results, spot: Spot) -> Figure:
     """Force of a dropper over the place of the leading pantograph."""
     leader = int(np.argmax(results.first_position))
     place = results.column("contact_position", leader)[:: results.line_record.every]
@@ -585,9 +580,6 @@ def _passage(results: Results, spot: Spot) -> Figure:
     tidy(axes, f"position of the {who} relative to the dropper [m]", "dropper force [N]")
     legend_above(axes)
     return figure
-
-
-_HEADING = "Validation by EN 50318"
 
 
 def statement_in(folder: Path) -> dict[str, Any]:
@@ -615,7 +607,7 @@ def statement_in(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path} is no record of `catenary validate`: it is incomplete") from error
 
 
-def validation_section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:
+def _validation_section(statement: Mapping[str, Any] | None, run: EvaluatedRun) -> Section:
     """Validation of the program that made a run, by what ``statement_in`` found; None if no
     statement is at hand."""
     if statement is None:
@@ -646,13 +638,9 @@ def _statement_blocks(
     yield Text(" ".join(statement["closing"]))
 
 
-# Snapshots times length of the line [m] of a picture that is quickly drawn.
-_LARGEST = 1e7
-
-
 def _waves_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     """Motion of the contact wire in space and time, from the snapshots of the run."""
-    # Snapshots of films are read as waves are.
+    # This section alone takes snapshots of a film, and the theory of waves.
     from catenary.cases.studies.waves import pictures
     from catenary.cases.studies.waves.seen import waves_seen
     from catenary.cases.studies.waves.theory import wave_theory
@@ -692,10 +680,10 @@ def full_sections(
     ----------
     scene : of the run; None leaves out what needs it
     costs : of its effects, as ``run_facts.effects`` takes them
-    statement : of the installation, as ``validation_section`` takes it
+    statement : of the installation, as ``_validation_section`` takes it
     """
     effects = SectionEntry("effects", partial(run_facts.effects, costs=costs))
-    worst = partial(worst_section, scene)
+    worst = partial(_worst_section, scene)
     behind = {"motion": [SectionEntry("worst", worst, dynamics.has_statistics, full=True)]}
     text = None
     if scene is not None:
@@ -703,9 +691,9 @@ def full_sections(
         behind["spectrum"] = [SectionEntry("waves", partial(_waves_section, scene), full=True)]
         behind["rest"] = [SectionEntry("line", partial(line_section, scene), full=True)]
         if scene.has_train:
-            sheet = partial(pantographs_section, scene)
+            sheet = partial(_pantographs_section, scene)
             behind["above"] = [SectionEntry("pantographs", sheet, full=True)]
-    behind["run"] = [SectionEntry("validation", partial(validation_section, statement), full=True)]
+    behind["run"] = [SectionEntry("validation", partial(_validation_section, statement), full=True)]
     last = SectionEntry("signatures", partial(run_facts.signatures, text), full=True)
     return [
         *(

@@ -27,6 +27,17 @@ POSITIVE = Annotated[float, Field(gt=0.0, le=1e9)]
 _NOT_NEGATIVE = Annotated[float, Field(ge=0.0, le=1e9)]
 NAME = Annotated[str, Field(min_length=1, max_length=100)]
 _NUMBER = Annotated[int, Field(ge=1, le=100)]
+LEAST_SAMPLES = 20
+# Samples are equidistant if none is further from even steps than this part of a step. Places in
+# whole centimetres may be up to one off, as far as this is at most the second part.
+_EVEN, _CENTIMETRE, _ROUNDED = 0.05, 0.0101, 0.1
+# Names of columns that need no description, with their units.
+_USUAL = {
+    "place": {"place_m": "m", "place_km": "km"},
+    "time": {"time_s": "s"},
+    "force": {"force_N": "N", "force_kN": "kN"},
+    "head_height": {"head_height_m": "m", "head_height_mm": "mm"},
+}
 
 
 class _Column(Table):
@@ -187,12 +198,6 @@ def read_description(path: Path) -> Description:
     return read_task(path, Description)
 
 
-LEAST_SAMPLES = 20
-# Samples are equidistant if none is further from even steps than this part of a step. Places in
-# whole centimetres may be up to one off, as far as this is at most the second part.
-_EVEN, _CENTIMETRE, _ROUNDED = 0.05, 0.0101, 0.1
-
-
 def read_table(path: Path) -> pd.DataFrame:
     """The table of a CSV file, with commas or with semicolons or tabs and decimal commas or points.
 
@@ -333,15 +338,6 @@ def evened_out(places: np.ndarray, path: str, is_described: bool = True) -> np.n
             f"by {usual:.4g} m; resample it at even steps of place or time, or cut it at gaps"
         )
     return even
-
-
-# Names of columns that need no description, with their units.
-_USUAL = {
-    "place": {"place_m": "m", "place_km": "km"},
-    "time": {"time_s": "s"},
-    "force": {"force_N": "N", "force_kN": "kN"},
-    "head_height": {"head_height_m": "m", "head_height_mm": "mm"},
-}
 
 
 def usual_description(table: pd.DataFrame, path: Path) -> Description:

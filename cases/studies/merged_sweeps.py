@@ -15,14 +15,14 @@ from catenary.cases.scene.input.faults import shown
 from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.histories import FILE as HISTORIES
 from catenary.cases.studies.sweep.histories import merge_histories
-from catenary.cases.studies.sweep.output import RECORD, table_files
-from catenary.cases.studies.sweep.sweep import other_value
+from catenary.cases.studies.sweep.output import table_files
+from catenary.cases.studies.sweep.sweep import RECORD, other_value
 from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import Uncertainty
 from catenary.cases.studies.uncertainty.run_table import read_sampling_beside
+from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.report.study_table import Column, StudyTable, write_files
 
-_DONE = "done"
 # Figures that differ between two runs of the same variant.
 _OWN = ("wall_s", "remarks")
 
@@ -194,7 +194,7 @@ def _by_variant(rows: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]
 
 
 def _done(rows: Sequence[dict[str, Any]]) -> bool:
-    return all(row.get("outcome") == _DONE for row in rows)
+    return all(row.get("outcome") == DONE for row in rows)
 
 
 def _agree(one: Sequence[dict[str, Any]], two: Sequence[dict[str, Any]]) -> bool:

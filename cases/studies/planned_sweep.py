@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.base.parallel import on_root
+from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import refuse_earlier
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies.sweep.jobs import HISTORIES, Ended, Part, RunOptions, check_names
@@ -71,7 +72,6 @@ class PlannedSweep(NamedTuple):
             no picture of None
         histogram : whether histograms of the contact forces are written too
         """
-        from catenary.cases.result_folder.folder_lock import held
 
         with held(self.out, comm, command):
             on_root(comm, lambda: refuse_earlier(self.out, options.force))
@@ -85,6 +85,7 @@ class PlannedSweep(NamedTuple):
         self, ended: list[Ended], plotted: Sequence[str] | None, histogram: bool
     ) -> tuple[list[Path], Uncertainty | None]:
         """The files of a sweep that ended, and what samples say. Not collective."""
+        from catenary.cases.studies.sweep.histories import FILE
         from catenary.cases.studies.sweep.output import files_of, table_of
         from catenary.cases.studies.uncertainty.output import write_evaluated
 
@@ -93,7 +94,7 @@ class PlannedSweep(NamedTuple):
         case, scene = own.first.case.name, own.draft.table()
         files = write_files(self.out, files_of(case, ended, lines, histogram, scene))
         if not isinstance(own, WholeRuns) and own.histories:
-            files += [path for path in (self.out / "histories.h5",) if path.is_file()]
+            files += [path for path in (self.out / FILE,) if path.is_file()]
         if self.sampling is not None:
             rows = table_of(ended).records()
             evaluated, more = write_evaluated(self.out, rows, self.sampling, plotted or ())

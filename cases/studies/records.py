@@ -24,6 +24,7 @@ from catenary.base.files import is_file
 from catenary.base.parallel import on_root
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.process.workers import Outcome, each, in_order
+from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import remove_dead_parts
 from catenary.cases.scene.input.plain_text import read_text
 from catenary.postproc.files.disk import plain, write_all
@@ -249,7 +250,6 @@ def held_study(
     command : work of this process in words, for other processes that find the folder locked
     force : delete kept rows first
     """
-    from catenary.cases.result_folder.folder_lock import held
 
     if out is None:
         yield HeldStudy(None, comm, NOTHING_KEPT)

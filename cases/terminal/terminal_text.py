@@ -14,6 +14,7 @@ from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import (
     UNCOMPARED,
     UNCOMPARED_SAYS,
+    VERDICTS,
     counted,
     decimals_that_tell,
     fixed,
@@ -83,7 +84,6 @@ def summary_text(
 
 def _acceptance(summary: Mapping[str, Any]) -> list[str]:
     """All criteria, those that are not judged with the reason, and by which rule books."""
-    words = {True: "passed", False: "FAILED", None: "not judged"}
     judged, left = summary["acceptance"], summary.get("not_judged", [])
     several = len({row.get("book") for row in [*judged, *left]}) > 1
     lines = []
@@ -93,12 +93,12 @@ def _acceptance(summary: Mapping[str, Any]) -> list[str]:
         # At a limit that has to be kept clear of, the relation alone tells why.
         only = f"{row['relation']} " if row["passed"] is False and value == limit else ""
         lines.append(
-            f"  {words[row['passed']]:10}  {labelled(row, several)}: {_number(value, digits)}, "
+            f"  {VERDICTS[row['passed']]:10}  {labelled(row, several)}: {_number(value, digits)}, "
             f"limit {only}{_number(limit, digits)} {row.get('unit', '')}".rstrip()
             + ("" if row.get("compared", True) else f" {UNCOMPARED}")
         )
     lines += [
-        f"  {words[None]:10}  {labelled(row, several)}, because {row['because']}" for row in left
+        f"  {VERDICTS[None]:10}  {labelled(row, several)}, because {row['because']}" for row in left
     ]
     if summary.get("judged_by"):
         whole = {True: "PASSED", False: "NOT PASSED", None: "NOT JUDGED"}[summary.get("passed")]

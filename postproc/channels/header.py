@@ -13,14 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
+    from catenary.meshgen.line import Line
+    from catenary.meshgen.mesh import LineMesh
     from catenary.solver.statics.elasticity import Elasticity
     from catenary.solver.statics.form_finding import Equilibrium
+
+NONE, GZIP = "none", "gzip"
+# Level 4 was not smaller than level 1 on the forces of droppers, and slower.
+GZIP_LEVEL = 1
 
 
 @dataclass(frozen=True)
@@ -144,11 +148,6 @@ def _registration(line: Line, mesh: LineMesh, form: Equilibrium) -> dict[str, np
         "static/arm_force": force,
         "static/arm_tension": tension,
     }
-
-
-NONE, GZIP = "none", "gzip"
-# Level 4 was not smaller than level 1 on the forces of droppers, and slower.
-GZIP_LEVEL = 1
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from catenary.postproc.evaluate.verdict import Criterion, criteria_of, judged_by
 from catenary.postproc.evaluate.wording import (
     UNCOMPARED,
     UNCOMPARED_SAYS,
+    VERDICTS,
     counted,
     decimals_that_tell,
     fixed,
@@ -44,9 +45,10 @@ _FORCES = (
     ("loss of contact [%]", "loss_percent", 1.0),
     ("contact height range [mm]", "contact_height_range", 1e3),
 )
-
-
 _Evaluated = tuple[Results, stats.RunStatistics]
+# With fewer spans nothing is said.
+_LEAST_SPANS = 4
+STATISTICS = ("mean", "standard deviation")
 
 
 def compare(*runs: Path | str, records: Sequence[Records | None] | None = None) -> str:
@@ -146,9 +148,6 @@ def _statistics(runs: Sequence[_Evaluated]) -> list[str]:
     ]
 
 
-_WORDS = {True: "passed", False: "FAILED", None: "not judged"}
-
-
 def _acceptance(*runs: _Evaluated) -> list[str]:
     """Every criterion of any run with its value and verdict in all."""
     found = [criteria_of(run, statistics) for run, statistics in runs]
@@ -173,12 +172,12 @@ def _judged(one: Criterion | None) -> str:
     if one is None:
         return "-"
     if one.absent:
-        return _WORDS[None]
+        return VERDICTS[None]
     if np.isnan(one.value):
-        return f"no value, {_WORDS[one.passed]}"
+        return f"no value, {VERDICTS[one.passed]}"
     mark = "" if one.compared else f" {UNCOMPARED}"
     digits = decimals_that_tell(one.value, one.limit, 2)
-    return f"{fixed(one.value, digits)} {one.unit} {_WORDS[one.passed]}{mark}"
+    return f"{fixed(one.value, digits)} {one.unit} {VERDICTS[one.passed]}{mark}"
 
 
 def table_row(label: str, values: Sequence[float], digits: int | None = None) -> str:
@@ -289,11 +288,6 @@ def _histories(a: Results, b: Results, letter: str) -> str:
     )
 
 
-# With fewer spans nothing is said.
-_LEAST_SPANS = 4
-STATISTICS = ("mean", "standard deviation")
-
-
 class SpanSums(NamedTuple):
     """Number of samples of each span (n,), their sum and the sum of their squares."""
 
@@ -356,14 +350,9 @@ def differences(first: SpanSums, second: SpanSums, paired: bool) -> Sequence[Dif
             freedom = square**2 / (own**2 / (n - 1) + other**2 / (m - 1))
         freedom = np.nan_to_num(freedom, nan=float(min(n, m) - 1))
     width = scipy_stats.t.ppf(0.975, freedom) * np.sqrt(square)
-    return [
-        Difference(*map(float, row))
-        for row in zip(values[:, 0], *_ends(values, width), strict=True)
-    ]
-
-
-def _ends(values: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return values[:, 0] - width, values[:, 0] + width
+    middle = values[:, 0]
+    ends = zip(middle, middle - width, middle + width, strict=True)
+    return [Difference(*map(float, row)) for row in ends]
 
 
 def _statistics_by_span(sums: SpanSums, whole: bool = False) -> np.ndarray:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from catenary.postproc.read.results import Results
 
 CUT_OFF = 20.0
+# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
+SETTLED = 6.0
 BAND_LIMIT = 5.0
 ORDER = 6
 # The filter of contact forces, for files that hold some.

@@ -1,6 +1,6 @@
 """Quantities of a run that rule books judge, or the sentence why the run has none.
 
-Each function is named in ``rule_books.QUANTITIES``; its values are in the unit that stands there.
+Each function is named in ``standards.rule_books``; its values are in the unit that stands there.
 """
 
 from __future__ import annotations

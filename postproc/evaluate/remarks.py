@@ -78,12 +78,12 @@ def _about_excitation(results: Results) -> list[str]:
 
 def _about_iterations(results: Results) -> list[str]:
     """Remark on steps above the tolerances, where the scene has a fixed number of iterations."""
-    counted = results.attributes.get("inner_iterations", {})
-    above, fixed = counted.get("unconverged_steps", 0), results.fact("fixed_iterations")
+    steps = results.attributes.get("inner_iterations", {})
+    above, fixed = steps.get("unconverged_steps", 0), results.fact("fixed_iterations")
     if not above or math.isnan(fixed):
         return []
     return [
-        f"{above} of {counted['steps']} steps ended above the tolerances of the fixed-point "
+        f"{above} of {steps['steps']} steps ended above the tolerances of the fixed-point "
         f"correction, because numerics.iterations = {fixed:g} ends each: their forces and motions "
         "are not consistent. Take more iterations, or leave the key out."
     ]
@@ -91,12 +91,12 @@ def _about_iterations(results: Results) -> list[str]:
 
 def _about_sizes(results: Results) -> list[str]:
     """Remark on steps above the tolerance though they were the shortest."""
-    counted = results.attributes.get("inner_iterations", {})
-    above = counted.get("steps_above_tolerance", 0)
+    steps = results.attributes.get("inner_iterations", {})
+    above = steps.get("steps_above_tolerance", 0)
     if not above:
         return []
     return [
-        f"{above} of {counted['steps']} steps were taken with an estimated error of the contact "
+        f"{above} of {steps['steps']} steps were taken with an estimated error of the contact "
         f"force above numerics.adaptive_tolerance_N = {results.fact('step_tolerance'):g}, being "
         "the shortest: take a smaller numerics.smallest_dt_s, or a larger tolerance."
     ]
@@ -224,8 +224,8 @@ def _about_head(mass: float, stiffness: float, dt: float) -> list[str]:
     if frequency < _FELT_HZ:
         where = "inside" if frequency < CUT_OFF else "near"
         result.append(
-            f"{begin}, {where} the 20 Hz band: results depend on "
-            "contact.stiffness_N_per_m. Compare them only with results of the same stiffness."
+            f"{begin}, {where} the 20 Hz band: results depend on the "
+            "stiffness of the contact. Compare them only with results of the same stiffness."
         )
     if omega * dt > _RESOLVED:
         result.append(

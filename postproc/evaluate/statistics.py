@@ -30,6 +30,8 @@ from catenary.postproc.read.results import Results, in_stretch
 SHORTEST_ARC = 5e-3
 HISTOGRAM_BIN, MOST_BINS = 10.0, 1000
 _NAN = float("nan")
+# Standard deviations from the mean to statistical extremes.
+_STATISTICAL = 3.0
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,7 @@ def contact_statistics(
     return PantographStatistics(
         name=name,
         **_of_force(force, filters.low_pass(force, dt)[within], within, dt),
-        contact_height_range=_range(wire_height, within, dt),
+        contact_height_range=_height_range(wire_height, within, dt),
     )
 
 
@@ -245,8 +247,8 @@ def _of_force(
         "std_5_20": float(filters.band_5_20(force, dt)[within].std()),
         "maximum": maximum,
         "minimum": minimum,
-        "stat_max": mean + 3.0 * std,
-        "stat_min": mean - 3.0 * std,
+        "stat_max": mean + _STATISTICAL * std,
+        "stat_min": mean - _STATISTICAL * std,
         "loss_percent": 100.0 * float(lost[within].mean()),
         # A loss that an end of the stretch cuts is as long as it is.
         "arcing_percent": 100.0 * float(without_short_losses(lost, dt)[within].mean()),
@@ -255,7 +257,7 @@ def _of_force(
     }
 
 
-def _range(wire_height: np.ndarray, within: np.ndarray, dt: float) -> float:
+def _height_range(wire_height: np.ndarray, within: np.ndarray, dt: float) -> float:
     return float(np.ptp(filters.low_pass(wire_height, dt)[within]))
 
 
@@ -298,7 +300,9 @@ def _pantograph(name: str, number: int, results: Results) -> PantographStatistic
         return PantographStatistics(
             name=name,
             **_of_force(force, filtered, within, results.dt),
-            contact_height_range=_range(results.column("wire_height", number), within, results.dt),
+            contact_height_range=_height_range(
+                results.column("wire_height", number), within, results.dt
+            ),
             unjudged=_unjudged(in_sentence(name), force[within], results),
         )
     except InputError as error:
@@ -327,7 +331,7 @@ def _supports(results: Results) -> SupportStatistics:
     x = results.line("arm_x")
     uplift = results.extremes("arm_uplift")[1]
     evaluated = in_stretch(x, *results.evaluation)
-    return SupportStatistics(x, uplift, evaluated, _of(uplift[evaluated], np.max))
+    return SupportStatistics(x, uplift, evaluated, _if_any(uplift[evaluated], np.max))
 
 
 def _droppers(results: Results) -> DropperStatistics:
@@ -340,8 +344,8 @@ def _droppers(results: Results) -> DropperStatistics:
         lowest,
         evaluated,
         (lowest <= 0.0) & (highest > 0.0) & slackens_at_all(results),
-        _of(highest[evaluated], np.max),
-        _of(lowest[evaluated], np.min),
+        _if_any(highest[evaluated], np.max),
+        _if_any(lowest[evaluated], np.min),
     )
 
 
@@ -355,7 +359,7 @@ def slackens_at_all(results: Results) -> bool:
     return bool(kept < 1.0)
 
 
-def _of(values: np.ndarray, which: Callable[..., Any]) -> float:
+def _if_any(values: np.ndarray, which: Callable[..., Any]) -> float:
     return float(which(values)) if values.size else _NAN
 
 
@@ -432,11 +436,10 @@ def lateral_ranges(results: Results) -> list[LateralRange]:
 
 def left_strips_sentence(p: LateralRange) -> str:
     """Sentence on a wire that left a strip, with time and place."""
-    who = "the pantograph" if p.name == "pantograph" else f"the {p.name} pantograph"
     return (
-        f"At {p.left_time:.4g} s, {p.left_x:.4g} m, a contact wire leaves the strips of {who}, "
-        f"which end {p.half_length:.3g} m beside their middle: it gets {abs(p.place):.3g} m away "
-        "from that. What follows assumes that it stays on them."
+        f"At {p.left_time:.4g} s, {p.left_x:.4g} m, a contact wire leaves the strips of "
+        f"{in_sentence(p.name)}, which end {p.half_length:.3g} m beside their middle: it gets "
+        f"{abs(p.place):.3g} m away from that. What follows assumes that it stays on them."
     )
 
 
@@ -454,10 +457,6 @@ def lateral_table(ranges: list[LateralRange]) -> list[dict[str, Any]]:
         }
         for p in ranges
     ]
-
-
-# Standard deviations from the mean to statistical extremes.
-_STATISTICAL = 3.0
 
 
 class ForceDerivatives(NamedTuple):

@@ -16,6 +16,14 @@ from typing import TextIO
 # Stands behind a limit that was not compared with the text of its standard, and explains itself.
 UNCOMPARED = "*"
 UNCOMPARED_SAYS = f"{UNCOMPARED} limit not compared with the text of the standard"
+# Verdicts on a criterion or a figure, None of one that is not judged.
+VERDICTS = {True: "passed", False: "FAILED", None: "not judged"}
+# Further digits after which two numbers are printed in full.
+_MOST_MORE = 9
+# Columns of which a terminal has at least so many: narrower text is harder to read than torn lines.
+_NARROWEST = 40
+# Blanks that stay within a line: before a unit, and before a mark at the end.
+_UNBROKEN = re.compile(r"(?<=\d) (?=(?:%|°|\w{1,2}(?:/\w+)?)(?!\w))| (?=\*$)")
 
 
 def fixed(value: float, digits: int) -> str:
@@ -68,10 +76,6 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60.0:.2g} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
-# Further digits after which two numbers are printed in full.
-_MOST_MORE = 9
-
-
 def decimals_that_tell(value: float | None, limit: float | None, fewest: int) -> int:
     """Decimals of a value and its limit with which different numbers print differently.
 
@@ -92,12 +96,6 @@ def decimals_that_tell(value: float | None, limit: float | None, fewest: int) ->
     return fewest + _MOST_MORE
 
 
-# Columns of which a terminal has at least so many: narrower text is harder to read than torn lines.
-_FEWEST = 40
-# Blanks that stay within a line: before a unit, and before a mark at the end.
-_KEPT = re.compile(r"(?<=\d) (?=(?:%|°|\w{1,2}(?:/\w+)?)(?!\w))| (?=\*$)")
-
-
 def terminal_width(stream: TextIO | None = None) -> int | None:
     """Columns of the terminal that a stream writes to; None if it is none, or none that says so.
 
@@ -115,7 +113,7 @@ def terminal_width(stream: TextIO | None = None) -> int | None:
         columns = os.get_terminal_size(stream.fileno()).columns
     except (AttributeError, OSError, ValueError):
         return None
-    return columns if columns >= _FEWEST else None
+    return columns if columns >= _NARROWEST else None
 
 
 def folded(text: str, width: int | None) -> str:
@@ -138,7 +136,7 @@ def _folded(line: str, width: int) -> str:
         return line
     below = " " * (gaps[-1] if gaps else indent + 2)
     kept = textwrap.fill(
-        _KEPT.sub("\N{NO-BREAK SPACE}", line),
+        _UNBROKEN.sub("\N{NO-BREAK SPACE}", line),
         width,
         subsequent_indent=below,
         break_long_words=False,

@@ -6,7 +6,8 @@ Attributes above 4 KiB and arrays without a filter have none either: they get a 
 
 Arrays, attributes and rows of growing tables are written by HDF5's own calls; for arrays and
 attributes these take a fourth to a third of the time of h5py's general ones, which find out anew
-what is the same for all of ours: numbers in contiguous arrays, written as they are.
+what is the same for all of ours: numbers in contiguous arrays, written as they are. Tables are read
+by blocks of rows: memory does not grow with a run.
 
 HDF5 follows links and external storage by itself. A file from a stranger could so read, and a run
 that is continued overwrite, any file of the user: ``open_own`` opens no file that links to another
@@ -29,6 +30,30 @@ import numpy as np
 from h5py import h5a, h5d, h5l, h5o, h5p, h5s, h5t
 
 from catenary.base.errors import InputError
+
+# The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
+# one marks a file as open for writing: after a kill nobody could open it.
+FORMAT_BOUNDS = ("v108", "v108")
+# Exceptions of HDF5 and h5py at a damaged file.
+HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
+# Attribute with the checksums of the other attributes, by name, as JSON.
+ATTRIBUTE_SUMS = "attribute_crc32"
+# Attribute of a group with one checksum of all its arrays.
+ARRAYS_SUM = "crc32"
+# Description of a link or a table that leads elsewhere, in the error.
+_LINKS = {h5l.TYPE_SOFT: "is a soft link", h5l.TYPE_EXTERNAL: "is a link into another file"}
+_OWN_KINDS = {
+    stat.S_IFLNK: "is a symbolic link, and result files are not opened through links; name the "
+    "folder in which the file itself lies",
+    stat.S_IFDIR: "is a folder",
+}
+_NO_FILTER = 0xFFFFFFFF
+# Largest size of a block of rows [B].
+BLOCK_BYTES = 16e6
+# Columns of a wide table that are read at once.
+COLUMNS_AT_ONCE = 256
+# Rows of a column that are read at once.
+_SLICE = 1 << 18
 
 
 def put_array(group: h5py.Group, name: str, values: Any) -> h5d.DatasetID:
@@ -110,17 +135,6 @@ def _text_type(size: int) -> tuple[np.dtype, h5t.TypeID]:
     return kind, h5t.py_create(kind, logical=True)
 
 
-# The oldest format of HDF5 whose object headers, links and attributes carry checksums. The next
-# one marks a file as open for writing: after a kill nobody could open it.
-FORMAT_BOUNDS = ("v108", "v108")
-# Exceptions of HDF5 and h5py at a damaged file.
-HDF5_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError)
-# Attribute with the checksums of the other attributes, by name, as JSON.
-ATTRIBUTE_SUMS = "attribute_crc32"
-# Attribute of a group with one checksum of all its arrays.
-ARRAYS_SUM = "crc32"
-
-
 def text_of(value: Any) -> Any:
     """An attribute's value as Python's own type: text as ``str``, a NumPy scalar as its item.
 
@@ -168,9 +182,14 @@ def broken_seals(place: h5py.HLObject, values: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _sum_of(value: Any) -> int:
+    """CRC-32 of an attribute's value as Python's own type."""
+    return zlib.crc32(repr(value).encode())
+
+
 def seal_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
     """Store one checksum of the arrays of a group, ``arrays`` by name."""
-    set_attribute(group, ARRAYS_SUM, sum_of_arrays(arrays))
+    set_attribute(group, ARRAYS_SUM, _sum_of_arrays(arrays))
 
 
 def put_sealed_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
@@ -184,7 +203,7 @@ def put_sealed_arrays(group: h5py.Group, arrays: Mapping[str, Any]) -> None:
     set_attribute(group, ARRAYS_SUM, total)
 
 
-def sum_of_arrays(arrays: Mapping[str, Any]) -> int:
+def _sum_of_arrays(arrays: Mapping[str, Any]) -> int:
     """CRC-32 of arrays with their names, in order of the names."""
     total = 0
     for name in sorted(arrays):
@@ -205,27 +224,13 @@ def sum_is_kept(group: h5py.Group, arrays: Mapping[str, Any]) -> bool | None:
     known = group.attrs.get(ARRAYS_SUM)
     if known is None:
         return None
-    return np.ndim(known) == 0 and bool(known == sum_of_arrays(arrays))
+    return np.ndim(known) == 0 and bool(known == _sum_of_arrays(arrays))
 
 
 def create_checked(file: h5py.Group, path: str, values: Any) -> h5py.Dataset:
     """A dataset with HDF5's own checksum; an empty one has nothing to check."""
     array = np.asarray(values)
     return file.create_dataset(path, data=array, fletcher32=bool(array.size) and array.ndim > 0)
-
-
-def _sum_of(value: Any) -> int:
-    """CRC-32 of an attribute's value as Python's own type."""
-    return zlib.crc32(repr(value).encode())
-
-
-# Description of a link or a table that leads elsewhere, in the error.
-_LINKS = {h5l.TYPE_SOFT: "is a soft link", h5l.TYPE_EXTERNAL: "is a link into another file"}
-_OWN_KINDS = {
-    stat.S_IFLNK: "is a symbolic link, and result files are not opened through links; name the "
-    "folder in which the file itself lies",
-    stat.S_IFDIR: "is a folder",
-}
 
 
 def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:
@@ -248,7 +253,7 @@ def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:
     OSError, RuntimeError
         If HDF5 cannot open the file, or not list its tables.
     """
-    refuse_irregular(path)
+    _refuse_irregular(path)
     file = h5py.File(path, mode, **options)
     try:
         fault = _leads_elsewhere(file)
@@ -262,7 +267,7 @@ def open_own(path: Path, mode: str = "r", **options: Any) -> h5py.File:
     return file
 
 
-def refuse_irregular(path: Path) -> None:
+def _refuse_irregular(path: Path) -> None:
     """Raise InputError if a path names a link, pipe, device or folder; OSError if nothing."""
     kind = stat.S_IFMT(os.lstat(path).st_mode)
     if kind != stat.S_IFREG:
@@ -307,9 +312,6 @@ def _oversize(name: bytes, table: h5d.DatasetID, size: int) -> str | None:
 
 def _text(name: bytes) -> str:
     return name.decode(errors="replace")
-
-
-_NO_FILTER = 0xFFFFFFFF
 
 
 def append_rows(dataset: h5py.Dataset, start: int, rows: np.ndarray) -> None:
@@ -415,14 +417,6 @@ def _mend_end(table: h5py.Dataset, rows: int) -> int:
             table.id.write_direct_chunk((begin, first)[: table.ndim], empty.tobytes(), _NO_FILTER)
             lost = rows - begin
     return lost
-
-
-# Largest size of a block of rows [B].
-BLOCK_BYTES = 16e6
-# Columns of a wide table that are read at once.
-COLUMNS_AT_ONCE = 256
-# Rows of a column that are read at once.
-_SLICE = 1 << 18
 
 
 def row_blocks(n_rows: int, n_columns: int, step: int = 1) -> Iterator[slice]:

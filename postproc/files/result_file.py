@@ -30,6 +30,7 @@ from catenary.postproc.channels.header import GZIP, GZIP_LEVEL, Header, LineReco
 from catenary.postproc.files import dimensions
 from catenary.postproc.files.chunk_shapes import Chunk, chunks_of, room_of
 from catenary.postproc.files.committed_rows import (
+    SLOTS,
     ForceFilter,
     cut,
     extremes_at,
@@ -77,9 +78,12 @@ from catenary.solver.time_loop.views.channels import Channel
 if TYPE_CHECKING:
     from catenary.solver.time_loop.views.observers import Stage
 
-# The state to continue from is kept twice and written in turn: a run that is killed while it
-# writes one still has the other.
-_SLOTS = ("0", "1")
+# Steps of the run as it was begun: what is recorded follows from them.
+BEGUN_FOR = "n_steps_begun_for"
+# Attributes that a later end leaves: who wrote the rows that are there, how, and who chose effects.
+_KEPT = ("versions", "petsc_options", "effects_on", "effects_off")
+# Tables that a later end changes beside attributes and facts.
+CHANGED = ("line/evaluation_range",)
 
 
 class LineRows(NamedTuple):
@@ -221,7 +225,7 @@ class ResultFile:
             self._on_begun()
 
     def check_in_place(self) -> None:
-        """Raise ``storage.Elsewhere`` if the path names this file no longer."""
+        """Raise ``disk.Elsewhere`` if the path names this file no longer."""
         if self._begun:
             check_in_place(self._path, self._file.id.get_vfd_handle())
 
@@ -255,7 +259,7 @@ class ResultFile:
         self._remove_if_empty()
 
     def _check_uncut(self) -> None:
-        """Raise ``storage.Cut`` if something of what was written is gone."""
+        """Raise ``disk.Cut`` if something of what was written is gone."""
         check_uncut(self._path, self._file.id.get_vfd_handle(), self._file.id.get_filesize())
 
     def _append_line(self, line: LineRows, blocks: Mapping[str, np.ndarray]) -> None:
@@ -286,7 +290,7 @@ class ResultFile:
     def _store(self, state: Mapping[str, Any]) -> None:
         """Write a state, the first one into both slots, any other into the older one."""
         group = self._file.require_group("checkpoint")
-        slots = (_SLOTS[self._n_states % 2],) if self._n_states else _SLOTS
+        slots = (SLOTS[self._n_states % 2],) if self._n_states else SLOTS
         for slot in slots:
             place = group.require_group(slot)
             for name in set(place) - set(state):  # of the line as it was before an incident
@@ -406,14 +410,6 @@ def _create_growing(
     set_attribute(dataset, "meaning", channel.meaning)
 
 
-# Steps of the run as it was begun: what is recorded follows from them.
-BEGUN_FOR = "n_steps_begun_for"
-# Attributes that a later end leaves: who wrote the rows that are there, how, and who chose effects.
-_KEPT = ("versions", "petsc_options", "effects_on", "effects_off")
-# Tables that it changes beside attributes and facts.
-CHANGED = ("line/evaluation_range",)
-
-
 def extend_run(path: Path, header: Header, n_steps: int) -> None:
     """Turn a result file into that of a run of ``n_steps`` interrupted where it has ended.
 
@@ -435,14 +431,14 @@ def extend_run(path: Path, header: Header, n_steps: int) -> None:
         with appears_whole(path) as made_as:
             shutil.copyfile(path, made_as, follow_symlinks=False)
             with opened(made_as, "r+") as file:
-                _change(file, header, n_steps)
+                _give_later_end(file, header, n_steps)
     except (OSError, RuntimeError) as error:
         raise RunBroken(
             f"{path} cannot be given a later end ({reason(error)}); it is as it was"
         ) from error
 
 
-def _change(file: h5py.File, header: Header, n_steps: int) -> None:
+def _give_later_end(file: h5py.File, header: Header, n_steps: int) -> None:
     known = {
         name: as_attribute(value)
         for name, value in {**header.attributes, "n_steps_planned": n_steps}.items()

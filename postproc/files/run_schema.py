@@ -1,6 +1,6 @@
 """Schema of ``run.h5``, declared once: attributes, tables, their dimensions, units and bounds.
 
-``result_file`` and ``dimensions`` write by these declarations, ``result_tables`` reads
+``result_file`` and ``dimensions`` write by these declarations, ``read.result_tables`` reads
 against them.
 """
 
@@ -259,9 +259,11 @@ class Table(NamedTuple):
     optional: bool = False
 
 
-def _numbers(dimensions: tuple[str, ...], meaning: str, optional: bool = False) -> Table:
-    """A table of numbers that count something from 0."""
-    return Table(dimensions, "-", meaning, low=0, high=1e12, whole=True, optional=optional)
+def count_table(
+    dimensions: tuple[str, ...], meaning: str = "", most: float = 1e12, optional: bool = False
+) -> Table:
+    """A table of numbers that count something from 0, up to ``most``."""
+    return Table(dimensions, "-", meaning, low=0, high=most, whole=True, optional=optional)
 
 
 def _force(dimensions: tuple[str, ...], meaning: str, optional: bool = False) -> Table:
@@ -271,12 +273,12 @@ def _force(dimensions: tuple[str, ...], meaning: str, optional: bool = False) ->
 _PLACE = "position along the track"
 CONSTANTS: dict[str, Table] = {
     "line/arm_x": Table((ARM,), "m", f"{_PLACE} of steady arms"),
-    "line/arm_wire": _numbers((ARM,), "number of the wire that each steady arm holds"),
+    "line/arm_wire": count_table((ARM,), "number of the wire that each steady arm holds"),
     "line/dropper_x": Table((DROPPER,), "m", f"{_PLACE} of droppers"),
-    "line/dropper_span": _numbers((DROPPER,), "span of each dropper, from 0"),
-    "line/droppers": _numbers((DROPPER, "upper_lower"), "nodes of each dropper"),
+    "line/dropper_span": count_table((DROPPER,), "span of each dropper, from 0"),
+    "line/droppers": count_table((DROPPER, "upper_lower"), "nodes of each dropper"),
     "line/end_x": Table((WIRE_END,), "m", f"{_PLACE} of ends of wires", optional=True),
-    "line/end_wire": _numbers((WIRE_END,), "number of the wire", optional=True),
+    "line/end_wire": count_table((WIRE_END,), "number of the wire", optional=True),
     "line/end_outwards": Table(
         (WIRE_END,), "-", "1 where the wire ends, -1 where it begins",
         low=-1, high=1, whole=True, optional=True,
@@ -329,16 +331,16 @@ def constant_tables(wires: Iterable[str], breaks: Iterable[str]) -> dict[str, Ta
     tables = dict(CONSTANTS)
     for name in wires:
         meaning = f"wires of {name}: numbers of nodes"
-        tables[f"line/wires/{name}"] = _numbers((f"wires_{name}",), meaning)
+        tables[f"line/wires/{name}"] = count_table((f"wires_{name}",), meaning)
     for name in breaks:
         meaning = f"breaks of {name}: numbers of nodes"
-        tables[f"line/breaks/{name}"] = _numbers((f"breaks_{name}",), meaning)
+        tables[f"line/breaks/{name}"] = count_table((f"breaks_{name}",), meaning)
     for name in channels.line_channels():
         columns, meaning = (
             COLUMNS[channels.CHANNELS[name].per],
             f"which columns of {name} are recorded, from 0",
         )
-        tables[f"line_columns/{name}"] = _numbers((columns,), meaning, optional=True)
+        tables[f"line_columns/{name}"] = count_table((columns,), meaning, optional=True)
     return tables
 
 

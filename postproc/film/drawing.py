@@ -23,17 +23,24 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from catenary.meshgen.mesh import DROPPERS
-from catenary.postproc.film import scenery as drawn
 from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import (
     COLOURS,
+    CONTACT,
+    DROPPER_FORCES,
     EYE,
+    FORCES,
     LOOKS,
+    MOTIONS,
     NEAREST,
     PANTOGRAPHS,
+    SLACK,
+    THICK,
     TRACK,
     TRAIN,
+    UNKNOWN,
+    WIRE,
     Colours,
     LinePart,
     Picture,
@@ -67,6 +74,8 @@ _APART = 0.15
 _FACES = ("#c3c8ce", "#c3c8ce", "#ccd1d7", "#ccd1d7", "#eceef1", "#dde1e6")
 _STYLE = {"font.size": 15, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
           "grid.color": "#e3e5e8", "axes.axisbelow": True, "text.parse_math": False}  # fmt: skip
+# Points of a curve at most, far more than a picture has columns of; marks along the track at most.
+_MOST_POINTS, _MOST_MARKS = 4000, 12
 
 
 @contextlib.contextmanager
@@ -149,10 +158,10 @@ class Drawing:
         self.words = write(_LINE[0], 0.925, "", fontsize=17, animated=True)
         _, title, low, high = self._colours
         bars: list[tuple[float, tuple[str, ...], float, float, str]] = [
-            (0.56, drawn.MOTIONS, 1e3 * low, 1e3 * high, f"{title} [mm]")
+            (0.56, MOTIONS, 1e3 * low, 1e3 * high, f"{title} [mm]")
         ]
         if strongest is not None and DROPPERS in self._scenery.line:
-            bars.append((0.79, drawn.DROPPER_FORCES, 0.0, strongest, "dropper force [N]"))
+            bars.append((0.79, DROPPER_FORCES, 0.0, strongest, "dropper force [N]"))
         for left, stops, bottom, top, label in bars:
             axes = self.figure.add_axes((left, 0.935, 0.195, 0.016))
             shown = ScalarMappable(Normalize(bottom, top), ramp(stops))
@@ -164,7 +173,7 @@ class Drawing:
             axes.tick_params(labelsize=13, length=4)
             write(left, 0.965, label, fontsize=14)
         if len(bars) > 1:
-            write(0.985, 0.965, "- - -  slack", fontsize=14, color=drawn.SLACK, ha="right")
+            write(0.985, 0.965, "- - -  slack", fontsize=14, color=SLACK, ha="right")
 
     def _add_lines(self, strongest: float | None) -> None:
         """Add the moving artists, empty, from behind to the front."""
@@ -185,21 +194,21 @@ class Drawing:
         if self._picture.view is View.PLAN:
             self._still[MASTS].set_linewidth(_USUAL * LOOKS[CLAMPS].thick)
         width = _USUAL * LOOKS[DROPPERS].thick
-        forces = ramp(drawn.DROPPER_FORCES).with_extremes(bad=drawn.UNKNOWN)
+        forces = ramp(DROPPER_FORCES).with_extremes(bad=UNKNOWN)
         self.droppers = lines(linewidths=width, cmap=forces, norm=Normalize(0.0, strongest or 1.0))
-        self.slack = lines(linewidths=1.3 * width, colors=drawn.SLACK, linestyles=(0, (2.5, 2.0)))
+        self.slack = lines(linewidths=1.3 * width, colors=SLACK, linestyles=(0, (2.5, 2.0)))
         self.slack.set_capstyle("butt")
         limits = Normalize(1e3 * self._colours.low, 1e3 * self._colours.high)
-        self.wires = lines(cmap=ramp(drawn.MOTIONS), norm=limits)
+        self.wires = lines(cmap=ramp(MOTIONS), norm=limits)
         about = self._scenery.parts[PANTOGRAPHS].fields
         self.bodies = lines(
-            linewidths=[_USUAL * drawn.THICK[kind] for kind in about["kind"].tolist()],
-            colors=[drawn.COLOURS[p % len(drawn.COLOURS)] for p in about["number"].tolist()],
+            linewidths=[_USUAL * THICK[kind] for kind in about["kind"].tolist()],
+            colors=[COLOURS[p % len(COLOURS)] for p in about["number"].tolist()],
         )
         self._arrows = lines(linewidths=2.0, colors="black")
         self.values = [
             axes.text(
-                0.0, 0.0, "", color=drawn.COLOURS[p % len(drawn.COLOURS)], fontsize=17,
+                0.0, 0.0, "", color=COLOURS[p % len(COLOURS)], fontsize=17,
                 fontweight="bold", clip_on=True, va="center",
                 ha="left" if self._picture.view is View.ALONG else "center", animated=True,
                 bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2.0},
@@ -257,7 +266,7 @@ class Drawing:
             ends = part.cells[chosen]
             lines = self._projection.seen(rest[ends].reshape(-1, 3), by[ends].reshape(-1, 3), eye)
             lines = lines.reshape(-1, 2, 2)
-            if kind in (drawn.CONTACT, drawn.WIRE):
+            if kind in (CONTACT, WIRE):
                 colour = 1e3 * by[ends, self._colours.axis].mean(axis=1)
                 wires.append((lines, colour, np.full(len(lines), _USUAL * LOOKS[kind].thick)))
             elif kind == DROPPERS:
@@ -311,7 +320,7 @@ class Drawing:
         above = np.concatenate([wires, bodies]).reshape(-1, 2)
         width = float(np.ptp(self._axes.get_xlim()))
         arrows = []
-        tops = seen(*beside[drawn.FORCES], eye)
+        tops = seen(*beside[FORCES], eye)
         for force, at, text, is_seen in zip(
             data.force[row].tolist(), tops, self.values, before, strict=True
         ):
@@ -373,10 +382,6 @@ def _seen_parts(scenery: Scenery, view: View) -> list[LinePart]:
             rest = np.column_stack([one.rest[:, 0], across, one.rest[:, 2]])
             found[number] = replace(one, rest=rest)
     return found
-
-
-# Points of a curve at most, far more than a picture has columns of; marks along the track at most.
-_MOST_POINTS, _MOST_MARKS = 4000, 12
 
 
 class ForceChart:

@@ -28,6 +28,15 @@ from catenary.solver.waves.excitation import Excitation, MovingForce, excitation
 
 # Defects and incidents after which a dropper is not there.
 _GONE = ("missing_dropper", "dropper_break")
+# Snapshots that are looked through for the largest motion.
+_SAMPLED = 200
+# Share of them that the ends of a scale hold.
+_ALMOST_ALL = 0.98
+# Snapshots that are kept for the next picture.
+_KEPT = 6
+# Times that are no further apart are the same [s].
+_SAME_TIME = 1e-9
+_UP = 2
 
 
 @dataclass(frozen=True)
@@ -187,17 +196,6 @@ def _filtered(results: Results, force: np.ndarray) -> np.ndarray:
     except InputError:
         return np.full_like(force, np.nan)
     return np.column_stack(columns)
-
-
-# Snapshots that are looked through for the largest motion.
-_SAMPLED = 200
-# Share of them that the ends of a scale hold.
-_ALMOST_ALL = 0.98
-# Snapshots that are kept for the next picture.
-_KEPT = 6
-# Times that are no further apart are the same [s].
-_SAME_TIME = 1e-9
-_UP = 2
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,27 @@ _FACES = np.array(
 _STEM, _HALF_STROKE = 0.5, 0.25
 # A view from the right and above shows wires that lie so far apart sideways [m].
 _APART = 0.05
+# Thickness of the lines of a pantograph by their kind, and its colour by its order, as in reports.
+THICK = {SPRING: 0.5, BODY: 1.0, HEAD: 1.7}
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
+# From the smallest to the largest motion, and from no force of a dropper to the largest one: both
+# grow darker or lighter all the way, also to eyes that see no red or no green.
+MOTIONS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#a8d327")
+DROPPER_FORCES = ("#d9c29a", "#c08f4f", "#8c5a23", "#4a2c0f")
+SLACK, UNKNOWN = "#d6006c", "#8c9198"
+# Share of the room between the wires that the largest motion fills in a drawing.
+_SHARE = 0.4
+# Room beside the track in a picture from above that motions are compared with [m], and how far it
+# reaches at least to either side, and beyond the wires [m].
+_BESIDE, _LEAST, _BEYOND = 1.0, 1.3, 0.6
+# Room above a contact wire without another wire [m].
+_LEAST_ABOVE = 0.8
+# Smaller motions are not seen [m].
+_SMALLEST = 1e-4
+# From the right and above: how far along the track, and up, what is a metre to the left is drawn.
+_DEPTH = 0.25, 0.35
+# From behind: how far the eye is behind the first thing seen, and the nearest that it sees [m].
+EYE, NEAREST = 12.0, 1.5
 
 
 class Look(NamedTuple):
@@ -56,14 +77,6 @@ LOOKS = {
     TRACK: Look(0.8, "#6b7078"),
     TRAIN: Look(0.2, "#d9dde2"),
 }
-# Thickness of the lines of a pantograph by their kind, and its colour by its order, as in reports.
-THICK = {SPRING: 0.5, BODY: 1.0, HEAD: 1.7}
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
-# From the smallest to the largest motion, and from no force of a dropper to the largest one: both
-# grow darker or lighter all the way, also to eyes that see no red or no green.
-MOTIONS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#a8d327")
-DROPPER_FORCES = ("#d9c29a", "#c08f4f", "#8c5a23", "#4a2c0f")
-SLACK, UNKNOWN = "#d6006c", "#8c9198"
 
 
 class Stroke:
@@ -285,21 +298,6 @@ def _boxes(position: np.ndarray, roof: float) -> np.ndarray:
         for x in (begin, end)
     ]
     return np.array(corners)
-
-
-# Share of the room between the wires that the largest motion fills in a drawing.
-_SHARE = 0.4
-# Room beside the track in a picture from above that motions are compared with [m], and how far it
-# reaches at least to either side, and beyond the wires [m].
-_BESIDE, _LEAST, _BEYOND = 1.0, 1.3, 0.6
-# Room above a contact wire without another wire [m].
-_LEAST_ABOVE = 0.8
-# Smaller motions are not seen [m].
-_SMALLEST = 1e-4
-# From the right and above: how far along the track, and up, what is a metre to the left is drawn.
-_DEPTH = 0.25, 0.35
-# From behind: how far the eye is behind the first thing seen, and the nearest that it sees [m].
-EYE, NEAREST = 12.0, 1.5
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.postproc.evaluate.wording import UNCOMPARED
+from catenary.postproc.evaluate.wording import UNCOMPARED, VERDICTS
 from catenary.postproc.files.disk import plain, write_all
 from catenary.postproc.measurements.alignment import Alignment
 from catenary.postproc.report.page import Picture, Section, Text, page
@@ -21,6 +21,15 @@ from catenary.postproc.report.study_table import Column, StudyTable, file_table
 
 # Source of the tolerances that a description may replace.
 LINE_TEST = "comparison with a line test, EN 50318"
+PAGE, SUMMARY, FIGURES = "measurement.html", "measurement.json", "figures.csv"
+FORCES, UPLIFTS = "forces.csv", "uplifts.csv"
+_FORCE, _UPLIFT = "measured_force", "measured_uplift"
+NO_ERRORS = "No error is seen: the measurement is that of this run, but for noise."
+WHOSE = "An error is one of the measurement, of its description, or of the scene that was run."
+_SOURCES = (
+    f"Tolerances marked {UNCOMPARED} are from memory of the {LINE_TEST}, and were not compared "
+    "with its text."
+)
 
 
 @dataclass(frozen=True)
@@ -129,18 +138,7 @@ class Comparison:
         return all(judged) if judged else None
 
 
-PAGE, SUMMARY, FIGURES = "measurement.html", "measurement.json", "figures.csv"
-FORCES, UPLIFTS = "forces.csv", "uplifts.csv"
-_FORCE, _UPLIFT = "measured_force", "measured_uplift"
-NO_ERRORS = "No error is seen: the measurement is that of this run, but for noise."
-WHOSE = "An error is one of the measurement, of its description, or of the scene that was run."
-_SOURCES = (
-    f"Tolerances marked {UNCOMPARED} are from memory of the {LINE_TEST}, and were not compared "
-    "with its text."
-)
-
-
-def figures_table(found: Comparison) -> StudyTable:
+def _figures_table(found: Comparison) -> StudyTable:
     """A row for each figure of run and measurement, with its tolerance and verdict."""
     columns = [
         Column("figure", "figure"),
@@ -154,7 +152,6 @@ def figures_table(found: Comparison) -> StudyTable:
         Column("because", "because"),
         Column("source"),
     ]
-    words = {True: "passed", False: "FAILED", None: "not judged"}
     return StudyTable(
         columns,
         [
@@ -166,7 +163,7 @@ def figures_table(found: Comparison) -> StudyTable:
                 "measured": one.measured,
                 "difference": one.run - one.measured,
                 "tolerance": None if np.isnan(one.tolerance) else one.tolerance,
-                "verdict": words[one.passed]
+                "verdict": VERDICTS[one.passed]
                 + (f" {UNCOMPARED}" if one.source == LINE_TEST and one.passed is not None else ""),
                 "because": one.because,
                 "source": one.source if not np.isnan(one.tolerance) else "",
@@ -184,10 +181,10 @@ def as_text(found: Comparison) -> str:
     lines += [f"ERROR       {one.text}" for one in found.findings] or [NO_ERRORS]
     lines += [WHOSE] if found.findings else []
     lines += [*(f"REMARK      {text}" for text in found.remarks), ""]
-    return "\n".join([*lines, figures_table(found).text(), _SOURCES])
+    return "\n".join([*lines, _figures_table(found).text(), _SOURCES])
 
 
-def summary_of(found: Comparison) -> dict[str, Any]:
+def _summary_of(found: Comparison) -> dict[str, Any]:
     """Findings, alignments, figures and remarks, for programs."""
     content: dict[str, Any] = plain(
         {
@@ -199,14 +196,14 @@ def summary_of(found: Comparison) -> dict[str, Any]:
                 one.pantograph: None if one.alignment is None else asdict(one.alignment)
                 for one in found.overlays
             },
-            "figures": figures_table(found).records(),
+            "figures": _figures_table(found).records(),
             "remarks": list(found.remarks),
         }
     )
     return content
 
 
-def forces_table(found: Comparison) -> StudyTable:
+def _forces_table(found: Comparison) -> StudyTable:
     """Places on the run's line, and forces and head heights there, of all pantographs."""
     names = ["pantograph", "place_m", "measured_N", "run_N", "measured_height_m", "run_height_m"]
     rows = []
@@ -218,7 +215,7 @@ def forces_table(found: Comparison) -> StudyTable:
     return file_table(names, rows)
 
 
-def uplifts_table(found: Comparison) -> StudyTable:
+def _uplifts_table(found: Comparison) -> StudyTable:
     """Supports with their largest uplifts; empty if these were not measured."""
     names = ["place_m", "measured_mm", "run_mm"]
     own, rows = found.uplift, []
@@ -230,7 +227,7 @@ def uplifts_table(found: Comparison) -> StudyTable:
     return StudyTable(columns, rows, "Largest uplifts at supports")
 
 
-def write(folder: Path, found: Comparison) -> list[Path]:
+def write_comparison(folder: Path, found: Comparison) -> list[Path]:
     """Write page, tables, JSON and pictures into a folder; returns the files. Not collective.
 
     Parameters
@@ -250,13 +247,13 @@ def write(folder: Path, found: Comparison) -> list[Path]:
     ]
     own = found.uplift
     uplifts = own and [("run", own.place, own.run), ("measured", own.place, own.measured)]
-    pictures = painted(_FORCE, lambda: along_track.forces(panels))
-    pictures |= painted(_UPLIFT, lambda: along_track.uplifts(uplifts or ()))
+    pictures = painted(_FORCE, lambda: along_track.overlaid_forces(panels))
+    pictures |= painted(_UPLIFT, lambda: along_track.overlaid_uplifts(uplifts or ()))
     content: dict[str, bytes | str] = {f"{name}.png": data for name, data in pictures.items()}
-    content[FIGURES], content[FORCES] = figures_table(found).csv(), forces_table(found).csv()
+    content[FIGURES], content[FORCES] = _figures_table(found).csv(), _forces_table(found).csv()
     if found.uplift is not None:
-        content[UPLIFTS] = uplifts_table(found).csv()
-    content[SUMMARY] = json.dumps(summary_of(found), indent=2) + "\n"
+        content[UPLIFTS] = _uplifts_table(found).csv()
+    content[SUMMARY] = json.dumps(_summary_of(found), indent=2) + "\n"
     title = f"{found.measured} beside {Path(found.run).parent.name}"
     content[PAGE] = page(title, f"{found.lead}.", _sections(found), pictures)
     return write_all(folder, content)
@@ -266,9 +263,9 @@ def _sections(found: Comparison) -> Iterator[Section]:
     errors = [Text(one.text, "bad", "Error: ") for one in found.findings]
     yield Section("Errors", [*errors, Text(WHOSE)] if errors else [Text(NO_ERRORS, "good")])
     force = Picture(_FORCE, "Contact forces below the cut-off, at the run's positions")
-    table = replace(figures_table(found), title="")
+    table = replace(_figures_table(found), title="")
     yield Section("Figures", [table], [force] if found.overlays else [])
     if found.uplift is not None:
         uplift = Picture(_UPLIFT, "Largest uplifts at supports")
-        yield Section("Uplift", [replace(uplifts_table(found), title="")], [uplift])
+        yield Section("Uplift", [replace(_uplifts_table(found), title="")], [uplift])
     yield Section("Remarks", [Text(text, "remark") for text in found.remarks])

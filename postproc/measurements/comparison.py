@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.postproc.channels.header import in_sentence
 from catenary.postproc.evaluate.compare import STATISTICS, differences, span_sums
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.measurements.alignment import (
@@ -51,6 +52,14 @@ _WIDENED = 6.0
 _NEAR_MAST = 1.0
 # A support is that of the run if it is this near [m].
 _NEAR_SUPPORT = 10.0
+# Errors below these are of no account, however certain: of places [m], of the force as a share of
+# its mean, of a filter as a share of the standard deviation.
+_SHIFT, _DRIFTED, _FORCE_SHARE, _FILTER_SHARE = 0.2, 0.1, 0.003, 0.03
+# A constant of so many stated deviations is no error.
+_BIASES = 3.0
+# Means and deviations of a measured force and of the run's differ by less than the first factor;
+# by the others where one is in N and the other in kN.
+_ALIKE, _UNITS = 3.0, (1e-3, 1e3)
 
 
 def compare_with(results: Results, passage: Passage) -> Comparison:
@@ -132,7 +141,7 @@ class _Comparing:
             self._find("missing pantograph", name, text)
             return
         expected = run.below(passage.cut_off)(run.position)
-        if other := other_scale(force, expected):
+        if other := _other_scale(force, expected):
             self._find(other[0], name, f"{name}: {other[1]}", float(np.mean(force)))
             return
         if np.median(force) < _NO_FORCE * float(np.mean(expected)):
@@ -147,7 +156,7 @@ class _Comparing:
         begin, end = self._stretch(run)
         if begin >= end:
             raise InputError(
-                f"{self._results.path} has the {name} from {run.position[0]:g} to "
+                f"{self._results.path} has {in_sentence(name)} from {run.position[0]:g} to "
                 f"{run.position[-1]:g} m, outside of the compared stretch, {passage.stretch[0]:g} "
                 f"to {passage.stretch[1]:g} m"
             )
@@ -161,7 +170,7 @@ class _Comparing:
             )
         aligned = self._placed(own, place, force)
         if aligned is not None:
-            self._found.findings += errors_of(aligned, name, run, passage, own.bias)
+            self._found.findings += _errors_of(aligned, name, run, passage, own.bias)
             if aligned.other_shifts:
                 shifts = ", ".join(f"{shift:+.1f}" for shift in aligned.other_shifts[:4])
                 self._found.remarks.append(f"{name}: shifts of {shifts} m fit as well")
@@ -238,7 +247,7 @@ class _Comparing:
             ratio = np.log(found.residual / max(there.residual, 1e-9))
             if 2.0 * found.n_independent * ratio > CERTAIN:
                 text = (
-                    f"{self._names[number]}: the measured force fits the {name} pantograph better "
+                    f"{self._names[number]}: the measured force fits {in_sentence(name)} better "
                     f"(residual {there.residual:.1f} N, not {found.residual:.1f} N)"
                 )
                 return text, float(other)
@@ -250,9 +259,9 @@ class _Comparing:
         factor, length = np.sqrt(CERTAIN), found.length
         self._found.remarks.append(
             f"{name}: noise floor {found.residual:.2f} N (correlation {found.correlation:.3f}); "
-            f"reported are a shift above {max(SHIFT, factor * found.shift.deviation):.2g} m, a "
-            f"drift above {max(DRIFTED, factor * found.drift.deviation * length):.2g} m, a gain "
-            f"above {100 * max(FORCE_SHARE, factor * found.gain.deviation):.2g} %"
+            f"reported are a shift above {max(_SHIFT, factor * found.shift.deviation):.2g} m, a "
+            f"drift above {max(_DRIFTED, factor * found.drift.deviation * length):.2g} m, a gain "
+            f"above {100 * max(_FORCE_SHARE, factor * found.gain.deviation):.2g} %"
         )
         self._beyond_noise(name, "noise floor", "N", found.residual, stated)
 
@@ -335,7 +344,7 @@ class _Comparing:
         offset, rest = float(difference.mean()), float(difference.std())
         # As for forces: what remains is noise, with its correlation.
         n = difference.size / correlation_time(difference)
-        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, BIASES * own.height_bias):
+        if abs(offset) > max(_HEIGHT, np.sqrt(CERTAIN / n) * rest, _BIASES * own.height_bias):
             text = f"{name}: head heights are {1e3 * offset:+.1f} mm off the run's throughout"
             self._find("height", name, text, offset)
         self._found.remarks.append(f"{name}: noise floor of heights {1e3 * rest:.2f} mm")
@@ -436,35 +445,12 @@ def _near_samples(position: np.ndarray, at: np.ndarray) -> np.ndarray:
     return np.asarray((position >= at[0]) & (position <= at[-1]) & near)
 
 
-# Errors below these are of no account, however certain: of places [m], of the force as a share of
-# its mean, of a filter as a share of the standard deviation.
-SHIFT, DRIFTED, FORCE_SHARE, _FILTER_SHARE = 0.2, 0.1, 0.003, 0.03
-# A constant of so many stated deviations is no error.
-BIASES = 3.0
-# Means and deviations of a measured force and of the run's differ by less than the first factor;
-# by the others where one is in N and the other in kN.
-_ALIKE, _UNITS = 3.0, (1e-3, 1e3)
-
-
-def errors_of(
+def _errors_of(
     found: Alignment, name: str, run: RunForce, passage: Passage, bias: float
 ) -> Iterator[Finding]:
-    """Errors of positions, of the force, and of the description's filter. Not collective.
-
-    Parameters
-    ----------
-    found : Alignment
-        Alignment of the measured force.
-    name : str
-        Name of the pantograph.
-    run : RunForce
-        Its force in the run.
-    passage : Passage
-        The measured passage.
-    bias : float
-        Stated deviation of a constant error of the force [N].
-    """
-    if found.shift.differs(0.0, SHIFT):
+    """Errors of positions, of the force, and of the description's filter; ``bias`` is the stated
+    deviation of a constant error of the force [N]."""
+    if found.shift.differs(0.0, _SHIFT):
         shift, way = found.shift, "far along the track" if found.shift.value > 0 else "far back"
         by = f"{abs(shift.value):.2f} m too {way} (+- {shift.deviation:.2g} m)"
         text = f"{name}: positions are {by} at {found.middle:.0f} m"
@@ -473,7 +459,7 @@ def errors_of(
             text += f": the clock is {abs(shift.value) / run.speed:.3f} s {early}"
         yield Finding("shift", name, text, shift.value)
     length = found.length
-    if found.drift.differs(0.0, DRIFTED / length):
+    if found.drift.differs(0.0, _DRIFTED / length):
         drift = found.drift
         what = "clock or speed" if passage.by_time else "positions"
         by = f"{1e3 * drift.value:+.2f} in 1000 (+- {1e3 * drift.deviation:.2g})"
@@ -482,10 +468,10 @@ def errors_of(
         yield Finding("drift", name, text, drift.value)
     mean = float(np.mean(run.below(passage.cut_off)(run.position)))
     if max(found.gain_certainty, found.offset_certainty) > CERTAIN and (
-        abs(found.offset.value) > max(FORCE_SHARE * mean, BIASES * bias)
+        abs(found.offset.value) > max(_FORCE_SHARE * mean, _BIASES * bias)
     ):
         yield Finding("gain", name, f"{name}: {_gain_words(found)}", found.gain.value)
-    elif found.both_certainty > CERTAIN and found.gain_beside_offset.differs(1.0, FORCE_SHARE):
+    elif found.both_certainty > CERTAIN and found.gain_beside_offset.differs(1.0, _FORCE_SHARE):
         gain = found.gain_beside_offset
         text = (
             f"{name}: the measured force fluctuates {gain.value:.3f} (+- {gain.deviation:.2g}) "
@@ -504,16 +490,9 @@ def errors_of(
         yield Finding("filter", name, text, float(value))
 
 
-def other_scale(force: np.ndarray, expected: np.ndarray) -> tuple[str, str] | None:
-    """Kind of the error and a sentence, if a force has another sign or unit than that of the run.
-
-    Parameters
-    ----------
-    force : ndarray, shape (n,)
-        Measured force [N].
-    expected : ndarray, shape (m,)
-        Force of the run in the same band [N].
-    """
+def _other_scale(force: np.ndarray, expected: np.ndarray) -> tuple[str, str] | None:
+    """Kind of the error and a sentence, if a measured force (n,) has another sign or unit than that
+    of the run in the same band, ``expected`` (m,) [N]."""
     mean, run = float(np.mean(force)), float(np.mean(expected))
     spread = float(np.std(force)), float(np.std(expected))
     if not (run > 0.0 and spread[1] > 0.0):

@@ -44,6 +44,17 @@ _TEMPLATE = "view.py.template"
 # Line in the window beside one pantograph [m], width over height of the window, and the share of
 # the room above the contact wire that the arrow of a mean force fills.
 _WIDTH, _ASPECT, _ARROW = 110.0, 1280.0 / 480.0, 0.4
+_NUMBERS = "scenery.h5"
+_CELLS = {1: "Polyvertex", 2: "Polyline", 4: "Quadrilateral"}
+STATE = "view.pvsm"
+PROGRAM, _SCREEN = "pvpython", "xvfb-run"
+# Longest that ParaView may take [s].
+_PATIENCE = 300.0
+# Without -noreset a screen starts anew whenever nobody is connected to it, and refuses whoever
+# comes meanwhile: ParaView connects, leaves and connects again.
+SCREEN_OF_ITS_OWN = "-screen 0 1600x900x24 -noreset"
+# Two that begin at one time may take one screen, which the first to end takes from the other.
+_ATTEMPTS, _LOST = 3, "X server connection"
 
 
 def write_script(
@@ -84,7 +95,7 @@ def write_script(
                 raise InputError(f"{target} is a link, through which nothing is written; remove it")
             try:
                 target.mkdir(exist_ok=True)
-                files = write_beside_line(scenery, snapshots, target)
+                files = _write_beside_line(scenery, snapshots, target)
                 settings = _settings(target, scenery, snapshots, motion, look or scenery.best_view)
                 write_whole(
                     target / SCRIPT,
@@ -148,38 +159,17 @@ def _settings(
     }  # fmt: skip
 
 
-_NUMBERS = "scenery.h5"
-_CELLS = {1: "Polyvertex", 2: "Polyline", 4: "Quadrilateral"}
-
-
-def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
-    """Write the parts beside the line at the times of the snapshots. Not collective.
-
-    Parameters
-    ----------
-    scenery : Scenery
-        Scenery of the run.
-    snapshots : Snapshots
-        Snapshots of the line.
-    folder : Path
-        Existing folder to which the files go.
-
-    Returns
-    -------
-    The XDMF file of each part by its name.
-
-    Raises
-    ------
-    OSError
-        If they cannot be written.
-    """
+def _write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
+    """Write the parts beside the line at the times of the snapshots into an existing folder;
+    returns the XDMF file of each by its name. OSError if they cannot be written."""
     data, grids = scenery.data, {name: list[str]() for name in scenery.parts}
     # In memory: HDF5 crashes the interpreter at its end where a disk has refused a write.
     with h5py.File(_NUMBERS, "w", driver="core", backing_store=False) as file:
+        put = file.create_dataset
         still = {
             name: (
-                _topology(_put(file, f"{name}/cells", part.cells.astype(np.int32))),
-                [_put(file, f"{name}/{own}", values.astype(np.int32))
+                _topology(put(f"{name}/cells", data=part.cells.astype(np.int32))),
+                [put(f"{name}/{own}", data=values.astype(np.int32))
                  for own, values in part.fields.items()],
             )
             for name, part in scenery.parts.items()
@@ -190,12 +180,12 @@ def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> d
                 if k and not moves:
                     continue
                 at = f"{name}/{k:06d}"
-                fields = [_put(file, f"{at}/displacement", moved.astype("<f4"))]
+                fields = [put(f"{at}/displacement", data=moved.astype("<f4"))]
                 if name == FORCES:
                     force = np.zeros((data.n_pantographs, 3), dtype="<f4")
                     force[:, 2] = data.force[data.row_at(time)]
-                    fields.append(_put(file, f"{at}/force", force))
-                points = _put(file, f"{at}/points", rest)
+                    fields.append(put(f"{at}/force", data=force))
+                points = put(f"{at}/points", data=rest)
                 grids[name].append(
                     _grid(topology, points, fields, of_cells, time if moves else None)
                 )
@@ -203,15 +193,8 @@ def write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> d
         write_whole(folder / _NUMBERS, bytes(file.id.get_file_image()))
     files = {name: folder / f"{name}.xdmf" for name in grids}
     for name, path in files.items():
-        write_whole(path, _text(name, grids[name]))
+        write_whole(path, _xdmf_text(name, grids[name]))
     return files
-
-
-# ---- XDMF --------------------------------------------------------------------------------------
-
-
-def _put(file: h5py.File, path: str, values: np.ndarray) -> h5py.Dataset:
-    return file.create_dataset(path, data=values)
 
 
 def _item(table: h5py.Dataset) -> str:
@@ -250,7 +233,7 @@ def _grid(
     return "\n".join(parts)
 
 
-def _text(name: str, grids: list[str]) -> str:
+def _xdmf_text(name: str, grids: list[str]) -> str:
     """A file of grids, of which several are one after another in time."""
     whole = [f'<Grid Name="{name}" GridType="Uniform">{grid}\n</Grid>' for grid in grids]
     if len(grids) > 1:
@@ -258,17 +241,6 @@ def _text(name: str, grids: list[str]) -> str:
         whole = [begin, *whole, "</Grid>"]
     head = '<?xml version="1.0" encoding="UTF-8"?>\n<Xdmf Version="3.0">\n<Domain>'
     return "\n".join([head, *whole, "</Domain>\n</Xdmf>\n"])
-
-
-STATE = "view.pvsm"
-PROGRAM, _SCREEN = "pvpython", "xvfb-run"
-# Longest that ParaView may take [s].
-_PATIENCE = 300.0
-# Without -noreset a screen starts anew whenever nobody is connected to it, and refuses whoever
-# comes meanwhile: ParaView connects, leaves and connects again.
-SCREEN_OF_ITS_OWN = "-screen 0 1600x900x24 -noreset"
-# Two that begin at one time may take one screen, which the first to end takes from the other.
-_ATTEMPTS, _LOST = 3, "X server connection"
 
 
 def write_state(script: Path) -> tuple[Path | None, str]:

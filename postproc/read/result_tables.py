@@ -56,6 +56,10 @@ _ATTEMPTS, _PAUSE = 20, 0.02
 _CACHE = 128 << 20
 
 Complete = tuple[list[int], str]
+# Facts without which there is no report; others may have been declared after a file was written.
+_ESSENTIAL_FACTS = ("time_step", "speed", "wave_speed")
+# Attributes that name the rules by which a run is judged; a report needs one of them.
+_RULES = ('its attribute "rules"', 'its attribute "edition"')
 
 
 def opened(path: Path) -> tuple[h5py.File, Complete | None]:
@@ -104,14 +108,6 @@ def _read_indices(file: h5py.File) -> None:
             item.id.get_num_chunks()
 
     file.visititems(read)
-
-
-# Facts without which there is no report; others may have been declared after a file was written.
-_ESSENTIAL_FACTS = ("time_step", "speed", "wave_speed")
-
-
-# Attributes that name the rules by which a run is judged; a report needs one of them.
-_RULES = ('its attribute "rules"', 'its attribute "edition"')
 
 
 class ValidatedFile:

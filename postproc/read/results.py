@@ -31,8 +31,12 @@ from catenary.postproc.read.result_tables import MarchedFile, ValidatedFile
 from catenary.postproc.read.validation import Records
 from catenary.solver.time_loop.views import channels
 
+logger = logging.getLogger("catenary.results")
+
 # Places along the line come from sums of span lengths, which round by far less [m].
 _ROUNDING = 1e-6
+# The tables of a result file, which is open and valid, or of a march that wrote none.
+ResultTables = ValidatedFile | MarchedFile
 
 
 def in_stretch(x: np.ndarray, start: float, end: float) -> np.ndarray:
@@ -43,6 +47,8 @@ def in_stretch(x: np.ndarray, start: float, end: float) -> np.ndarray:
 class ContactProfile(NamedTuple):
     """A contact wire at rest.
 
+    Attributes
+    ----------
     breaks : places among its nodes at which further pieces of it begin
     x, height : of its nodes along the track, and above the rail [m]
     y : of its nodes to the left [m]; None where no wire moves sideways
@@ -71,10 +77,6 @@ class ContactProfile(NamedTuple):
         """Places along the track and values at the nodes, with a gap between pieces."""
         x = np.insert(self.x, self.breaks, self.x[self.breaks])
         return x, np.insert(values, self.breaks, np.nan)
-
-
-# The tables of a result file, which is open and valid, or of a march that wrote none.
-ResultTables = ValidatedFile | MarchedFile
 
 
 class LineOfRun:
@@ -256,9 +258,6 @@ class TrainOfRun(LineOfRun):
     def first_position(self) -> np.ndarray:
         """Places of the pantographs in the first record, (n_pantographs,) [m]."""
         return np.asarray(self._file["channels/contact_position"][0])
-
-
-logger = logging.getLogger("catenary.results")
 
 
 class Results(TrainOfRun):

@@ -41,6 +41,8 @@ from catenary.solver.time_loop.views.channels import RUN, Channel
 
 # Faults of a file that one sentence names.
 _MOST_NAMED = 3
+# A time may be this share of a step off its place.
+_OFF = 1e-3
 
 
 def is_number(value: Any, low: float = -math.inf) -> bool:
@@ -188,10 +190,6 @@ def listed(faults: Collection[str]) -> str:
     """Faults as one clause; the first few are named, the others counted."""
     shown, more = list(faults)[:_MOST_NAMED], len(faults) - _MOST_NAMED
     return "; ".join(shown) + (f"; and {more} more faults" if more > 0 else "")
-
-
-# A time may be this share of a step off its place.
-_OFF = 1e-3
 
 
 class Records(NamedTuple):

@@ -28,6 +28,26 @@ if TYPE_CHECKING:
     from jinja2 import Template
     from matplotlib.figure import Figure
 
+_TEMPLATES = Path(__file__).parent / "templates"
+# A figure with its unit, which stay on one line.
+_FIGURE = re.compile(r"(?<=\d) (%|(?:N|kN|mm|m|km|kg|Hz|s|J)(?:/[A-Za-z]{1,2})?)(?![\w/])")
+# A unit behind its figure, or in brackets.
+_UNIT = re.compile(r"(?<=\xa0)\w+/\w+|\[\w+/\w+\]")
+# Cells of tables that are coloured.
+_MARKS = {
+    "passed": "yes", "failed": "no", "yes": "yes", "no": "no", "?": "unknown",
+    "reproduced": "yes", "not reproduced": "no", "cannot be decided": "unknown",
+}  # fmt: skip
+# A figure is printed this much smaller at most, where it then fits the rest of a sheet [-].
+_SMALLEST = 0.8
+# Height of a sheet between the margins that the style of the page has, less what rows and headings
+# leave that move to the next sheet; height of a caption, which keeps its size [px of CSS].
+_SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 9.0) * 96.0 / 25.4, 28.0
+# A sheet on which all of a report has room: it tells how high everything is.
+_ENDLESS = "@page { size: 210mm 100000mm !important; }"
+# A heading so close above a figure goes with it to the next sheet [px of CSS].
+_CLOSE = 60.0
+
 
 @dataclass(frozen=True)
 class EvaluatedRun:
@@ -144,18 +164,6 @@ def number(value: Any, digits: int = 1) -> str:
     return "–" if value is None or value != value else fixed(value, digits)
 
 
-_TEMPLATES = Path(__file__).parent / "templates"
-# A figure with its unit, which stay on one line.
-_FIGURE = re.compile(r"(?<=\d) (%|(?:N|kN|mm|m|km|kg|Hz|s|J)(?:/[A-Za-z]{1,2})?)(?![\w/])")
-# A unit behind its figure, or in brackets.
-_UNIT = re.compile(r"(?<=\xa0)\w+/\w+|\[\w+/\w+\]")
-# Cells of tables that are coloured.
-_MARKS = {
-    "passed": "yes", "failed": "no", "yes": "yes", "no": "no", "?": "unknown",
-    "reproduced": "yes", "not reproduced": "no", "cannot be decided": "unknown",
-}  # fmt: skip
-
-
 def page(
     title: str,
     lead: str,
@@ -238,17 +246,6 @@ def _data_uri(data: bytes) -> str:
     return f"data:image/{kind};base64," + base64.b64encode(data).decode("ascii")
 
 
-# A figure is printed this much smaller at most, where it then fits the rest of a sheet [-].
-_SMALLEST = 0.8
-# Height of a sheet between the margins that the style of the page has, less what rows and headings
-# leave that move to the next sheet; height of a caption, which keeps its size [px of CSS].
-_SHEET, _CAPTION = (297.0 - 15.0 - 18.0 - 9.0) * 96.0 / 25.4, 28.0
-# A sheet on which all of a report has room: it tells how high everything is.
-_ENDLESS = "@page { size: 210mm 100000mm !important; }"
-# A heading so close above a figure goes with it to the next sheet [px of CSS].
-_CLOSE = 60.0
-
-
 def pdf(html: str) -> bytes:
     """A page as PDF on A4, with page numbers and bookmarks. Not collective.
 
@@ -267,20 +264,20 @@ def pdf(html: str) -> bytes:
     CSS, HTML, URLFetcher = _weasyprint()
     fetcher = URLFetcher(allowed_protocols=["data"])  # pictures are in the page
     cache: dict[str, Any] = {}  # of pictures, which are laid out twice
-    page = HTML(string=html, url_fetcher=fetcher)
+    document = HTML(string=html, url_fetcher=fetcher)
     # Folded parts are not printed; without them large tables are laid out in a third.
-    for folded in page.etree_element.iter("details"):
+    for folded in document.etree_element.iter("details"):
         folded[:] = folded.findall("summary")
-    figures = list(page.etree_element.iter("figure"))
+    figures = list(document.etree_element.iter("figure"))
     for n, figure in enumerate(figures):
         figure.set("id", f"figure-{n}")
-    layout = page.render(stylesheets=[CSS(string=_ENDLESS)], cache=cache)
+    layout = document.render(stylesheets=[CSS(string=_ENDLESS)], cache=cache)
     tops = {name: (box[1], box[3]) for name, box in layout.pages[0].anchors.items()}
     boxes = [tops.pop(figure.get("id")) for figure in figures]
     found = shares(boxes, [top for top, _ in tops.values()])
     for figure, share in zip(figures, found, strict=True):
         figure.set("style", f"--share: {share:.3f}")
-    return bytes(page.write_pdf(cache=cache))
+    return bytes(document.write_pdf(cache=cache))
 
 
 def shares(figures: Sequence[tuple[float, float]], headings: Sequence[float]) -> list[float]:

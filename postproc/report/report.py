@@ -97,7 +97,7 @@ def write_report(
     out_dir : Path or str
         Folder that exists.
     records : Records, optional
-        What ``read.guard`` found in the file; without it the file is checked here.
+        What ``guard.examined`` found in the file; without it the file is checked here.
     entries : sequence of SectionEntry, optional
         Sections; those of ``quick_sections`` without it.
     beside : mapping, optional

@@ -35,6 +35,16 @@ KMH = 3.6  # km/h in 1 m/s; books state limits over the speed in km/h
 
 # Parts of a run that a quantity has a value for.
 RUN, PANTOGRAPH = "run", "pantograph"
+# Speeds in km/h come from m/s with a rounding error: 200 km/h is 55.555... m/s.
+_ROUNDING = 1e-9
+_NAME = r"^[a-z][a-z0-9_]*$"
+_LONGEST = 500
+_FORMS = ("value", "polynomial", "of_quantity", "of_limit", "of_key")
+Text = Annotated[str, Field(max_length=_LONGEST, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+_FOLDER = Path(__file__).with_name("books")
+# By which a run is judged whose scene names no book: the newest edition of it.
+DEFAULT = "en50367"
 
 
 class Quantity(NamedTuple):
@@ -118,16 +128,6 @@ LIMIT_KEYS: dict[str, LimitKey] = {
     "contact_wire_tension_N": LimitKey("N", "allowed tension of a contact wire, worn as it is"),
     "contact_wire_strain_um_per_m": LimitKey("um/m", "allowed bending strain of a contact wire"),
 }
-
-
-# Speeds in km/h come from m/s with a rounding error: 200 km/h is 55.555... m/s.
-_ROUNDING = 1e-9
-_NAME = r"^[a-z][a-z0-9_]*$"
-_LONGEST = 500
-_FORMS = ("value", "polynomial", "of_quantity", "of_limit", "of_key")
-
-Text = Annotated[str, Field(max_length=_LONGEST, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
-Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
 class _Part(BaseModel):
@@ -412,11 +412,6 @@ def _plain(text: str, most: int = 200) -> str:
     text = re.sub(r"\s+", " ", text)
     text = "".join(letter if letter.isprintable() else "?" for letter in text)
     return text if len(text) <= most else f"{text[: most - 3]}..."
-
-
-_FOLDER = Path(__file__).with_name("books")
-# By which a run is judged whose scene names no book: the newest edition of it.
-DEFAULT = "en50367"
 
 
 @functools.cache

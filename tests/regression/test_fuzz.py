@@ -270,7 +270,7 @@ def check_end(scene: Scene, run: RunHistories) -> None:
     assert run.counters["unconverged_steps"] == unsolved or numerics.iterations is not None
 
 
-def switches_by_itself(rest: hard_runs.AtRest, run: RunHistories) -> bool:
+def switches_by_itself(rest: hard_runs.LineAtRest, run: RunHistories) -> bool:
     """Whether a dropper slackens or tightens, other than by breaking, or an uplift stop is met."""
     if run.stops.any():
         return True
@@ -309,7 +309,7 @@ def check_run(assignments: tuple[str, ...]) -> bool:
     return True
 
 
-def nudged(assignments: tuple[str, ...]) -> hard_runs.AtRest:
+def nudged(assignments: tuple[str, ...]) -> hard_runs.LineAtRest:
     """The scene at rest with a static force that differs in the 12th digit.
 
     A head that hops on a stiff contact without damping is chaotic, and multiplies round-off with

@@ -144,7 +144,9 @@ def test_a_damaged_run_is_told_and_one_that_ends_before_the_stretch_refused(
     assert any("time is damaged from record" in one for one in found_in(tmp_path, table).remarks)
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         file["time"][300:] = np.nan
-    words = r"from 65 to 106\.\d+ m, outside of the compared stretch, 120 to 420 m"
+    words = (
+        r"has the pantograph from 65 to 106\.\d+ m, outside of the compared stretch, 120 to 420 m"
+    )
     with pytest.raises(InputError, match=words):
         found_in(tmp_path, table)
 
@@ -493,7 +495,7 @@ def test_a_validation_takes_a_comparison_as_its_line_test(
 ) -> None:
     """A force sensor shows 4 N too much, of which the description allows 2.5 N."""
     off = table.assign(force_N=table["force_N"] + 4.0)
-    compared.write(tmp_path, found_in(run, off, tolerances={"mean_N": 2.5}))
+    compared.write_comparison(tmp_path, found_in(run, off, tolerances={"mean_N": 2.5}))
     step = line_test(tmp_path)
     rows = {row["quantity"]: row for row in step.rows}
     mean = rows["mean [N]"]

@@ -293,14 +293,14 @@ def test_derivatives_at_rest_say_what_they_are_and_what_is_left_out(
 ) -> None:
     from catenary.cases.studies.sensitivity import derivatives
 
-    own, tension = derivatives._derivative, "line.contact_wire.tension_N"
+    own, tension = derivatives._rest_derivative, "line.contact_wire.tension_N"
 
     def derivative(parameter: Any, *rest: Any) -> np.ndarray:
         if parameter.key == tension:
             raise catenary.InputError("it makes a dropper slack")
         return own(parameter, *rest)
 
-    monkeypatch.setattr(derivatives, "_derivative", derivative)
+    monkeypatch.setattr(derivatives, "_rest_derivative", derivative)
     found = catenary.static(catenary.load("tramway", short=True)).sensitivity()
     assert tension not in found.parameter
     assert found.attrs["left_out"] == [f"{tension}: it makes a dropper slack"]

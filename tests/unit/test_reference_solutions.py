@@ -36,10 +36,10 @@ from catenary.cases.studies.reference.solutions import (
     UPLIFT,
     configurations,
     jobs_of,
-    read,
+    model_table,
+    read_solution,
     run_name,
-    statistics,
-    table,
+    statistics_of_solution,
 )
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.variants import Variant
@@ -77,7 +77,7 @@ def test_error_bars_cover_a_law_of_second_order() -> None:
         run = Ended(job.variant, "done", summary_of(lambda *_, v=value: v), measured)
         ended[job.variant.name] = run
     finest = a * one.steps[0] ** 2 + b / one.elements[0] ** 2
-    rows = {(row["of"], row["quantity"]): row for row in statistics(one, ended)}
+    rows = {(row["of"], row["quantity"]): row for row in statistics_of_solution(one, ended)}
     assert set(QUANTITIES) == {quantity for _, quantity in rows}
     for row in rows.values():
         # Rounded to a millionth each.
@@ -93,7 +93,7 @@ def test_error_bars_cover_a_law_of_second_order() -> None:
 def test_the_line_is_moved_on_by_whole_spans() -> None:
     (one,) = configurations(["dc_simple_200_one"])
     scene, further = one.scene(), jobs_of([one])[-1].scene
-    spans = table()["levels"]["further_spans"]
+    spans = model_table()["levels"]["further_spans"]
     assert further.line.n_spans - scene.line.n_spans == spans
     assert further.evaluation.from_m - scene.evaluation.from_m == 55.0 * spans
     assert further.evaluation.to_m - scene.evaluation.to_m == 55.0 * spans
@@ -101,7 +101,7 @@ def test_the_line_is_moved_on_by_whole_spans() -> None:
 
 @pytest.mark.parametrize("one", configurations(), ids=lambda one: one.name)
 def test_shipped_statistics_are_those_of_the_shipped_forces(one: Any) -> None:
-    solution = read(one.name)
+    solution = read_solution(one.name)
     scene = one.scene()
     assert solution.stretch == (scene.evaluation.from_m, scene.evaluation.to_m)
     assert {of for of, _ in solution.figures} == {*solution.forces, LINE}
@@ -136,7 +136,7 @@ def test_the_guide_has_the_shipped_figures() -> None:
     shown = re.findall(row, text, re.MULTILINE)
     expected = []
     for one in configurations():
-        solution = read(one.name)
+        solution = read_solution(one.name)
         for of in solution.forces:
             bars = [solution.figures[of, name] for name in ("std_N", "max_N", "min_N")]
             cells = " | ".join(f"{value:.3f} ± {bar:.3f}" for value, bar in bars)
@@ -147,7 +147,7 @@ def test_the_guide_has_the_shipped_figures() -> None:
 
 def test_its_own_forces_are_within_the_bars(tmp_path: Path) -> None:
     """Over place and over time, as they are published."""
-    solution = read(TWO)
+    solution = read_solution(TWO)
     train = problem_of(solution.configuration.scene()).train
     given = pd.read_csv(DATA / f"{TWO}.csv")
     for number, of in enumerate(solution.forces):
@@ -171,7 +171,7 @@ def test_places_and_times_that_differ_are_told(tmp_path: Path) -> None:
     """Times of the leading pantograph beside places at which each one passes: the trailing one is
     200 m behind at these times."""
     given = pd.read_csv(DATA / f"{TWO}.csv")
-    train = problem_of(read(TWO).configuration.scene()).train
+    train = problem_of(read_solution(TWO).configuration.scene()).train
     given["time_s"] = (given[PLACE] - train.start) / train.speed
     given.to_csv(tmp_path / "forces.csv", index=False)
     (found,) = read_results([tmp_path / "forces.csv"], TWO, is_filtered=True)
@@ -197,7 +197,7 @@ def test_a_planted_error_is_found(tmp_path: Path) -> None:
 
 def test_unfiltered_forces_are_filtered(tmp_path: Path) -> None:
     """A ripple of 200 Hz goes; what is left is the shipped force, but for ends of the record."""
-    solution = read(ONE)
+    solution = read_solution(ONE)
     speed = problem_of(solution.configuration.scene()).train.speed
     place = np.linspace(*solution.stretch, 14401)
     force = np.interp(place, solution.place, solution.forces["pantograph"])
@@ -215,7 +215,7 @@ def test_unfiltered_forces_are_filtered(tmp_path: Path) -> None:
 
 def rippled(path: Path, spacing: float) -> None:
     """The shipped force and 20 N at 66 Hz, which samples every metre, 76 a second, show as 10."""
-    solution = read(ONE)
+    solution = read_solution(ONE)
     train = problem_of(solution.configuration.scene()).train
     start, end = solution.stretch
     place = np.arange(start - 30.0, end + 30.0, spacing)
@@ -370,7 +370,7 @@ def runs_of_validation() -> dict[str, Ended]:
         summary = summary_of(lambda _, quantity, n=name: ranges.get((n, quantity), 0.1))
         ended[name] = Ended(Variant(name, ()), "done", summary)
     for one in configurations():
-        figures = read(one.name).figures
+        figures = read_solution(one.name).figures
         summary = summary_of(lambda *key, f=figures: f[key][0], nominal, one.train)
         ended[one.name] = Ended(Variant(one.name, ()), "done", summary)
     assert {job.variant.name for job in validation.jobs_of_validation()} == set(ended)

@@ -25,7 +25,13 @@ from catenary.cases.run.runner import run_case
 from catenary.cases.studies.merged_sweeps import merge
 from catenary.cases.studies.records import read_record
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, RunOptions, make_jobs
-from catenary.cases.studies.sweep.output import as_text, draw, files_of, key_in_words, table_of
+from catenary.cases.studies.sweep.output import (
+    as_text,
+    draw_statistics,
+    files_of,
+    key_in_words,
+    table_of,
+)
 from catenary.cases.studies.sweep.run_jobs import read_summary, run_jobs
 from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
@@ -339,7 +345,7 @@ def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
         for speed in ("300", "200")
     ]
     keys, shown = ["contact.law", "train.speed_km_h"], ["std_N", "max_uplift_mm"]
-    figure = draw(table_of(ended).rows, keys, shown)
+    figure = draw_statistics(table_of(ended).rows, keys, shown)
     assert curves_of(figure) == {
         "leading, law hard": [(200.0, 200.0), (300.0, 300.0)],
         "leading, law soft": [(200.0, 200.0), (300.0, 300.0)],
@@ -353,7 +359,7 @@ def test_statistics_are_drawn_over_the_key_with_numbers() -> None:
 
 def test_words_stand_on_the_axis_where_no_key_has_numbers() -> None:
     ended = [fake("a", {"contact.law": "hard"}, 3.0), fake("b", {"contact.law": "soft"}, 4.0)]
-    figure = draw(table_of(ended).rows, ["contact.law"], ["std_N"])
+    figure = draw_statistics(table_of(ended).rows, ["contact.law"], ["std_N"])
     assert curves_of(figure) == {"leading": [(0.0, 3.0), (1.0, 4.0)]}
     assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["hard", "soft"]
 

@@ -25,7 +25,7 @@ from scenes import problem_of as scene_problem
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 from verb_runner import invoke
 
-from catenary.cases.studies.reference.solutions import DATA, Solution, read, rms
+from catenary.cases.studies.reference.solutions import DATA, Solution, read_solution, rms
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.topologies.line_data import ClampedWire
 from catenary.meshgen.wires import Conductor
@@ -171,7 +171,7 @@ def check_figures(
 def test_plain_finite_differences_reach_a_reference_solution(name: str) -> None:
     data = data_of(name)
     runs = [DifferenceLine(data, h).run(dt, ahead) for h, dt, ahead in grids_of(data)]
-    check_figures(read(name), runs)
+    check_figures(read_solution(name), runs)
 
 
 @pytest.mark.study
@@ -180,7 +180,7 @@ def test_plain_finite_differences_reach_a_reference_solution(name: str) -> None:
 @pytest.mark.parametrize("name", BY_ELEMENTS)
 def test_plain_finite_elements_reach_a_reference_solution(name: str) -> None:
     """Figures, and forces along the stretch."""
-    solution, (longest, step) = read(name), BY_ELEMENTS[name]
+    solution, (longest, step) = read_solution(name), BY_ELEMENTS[name]
     problem, runs = scene_problem(solution.configuration.scene()), []
     for halvings in (0, 1):
         halved = replace(problem, numerics=replace(problem.numerics, dt=step / 2**halvings))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from catenary.base.parallel import on_root
 from catenary.cases.cli.app import (
     RunFolder,
     RunWords,
@@ -142,7 +143,6 @@ def what_if(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.base.parallel import on_root
     from catenary.callers import temporary_folder
     from catenary.cases.studies.questions import what_if as question
 

@@ -1,7 +1,6 @@
-"""The verbs that run many variants of a case: ``sweep``, ``uncertainty``, ``merge``, ``optimise``.
+"""Verbs of many runs: ``sweep``, ``uncertainty``, ``merge``, ``optimise`` and ``tolerance``.
 
-``tolerance`` is one of them, too. ``optimise`` and ``tolerance`` read a task from a file. What
-``run --study`` does stands here as well.
+The last two read a task from a file. What ``run --study`` does stands here as well.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import typer
 import catenary
 from catenary.base.errors import InputError
 from catenary.base.files import is_folder
+from catenary.base.process import alone
 from catenary.cases.cli.app import (
     Force,
     Jobs,
@@ -27,10 +27,12 @@ from catenary.cases.cli.app import (
     Vary,
     folder_option,
     leave,
+    names_in,
     print_findings,
     serial_verb,
     verb,
 )
+from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 
@@ -119,7 +121,7 @@ def sweep(
 
     def read() -> tuple[PlannedSweep, list[str]]:
         draft, options = words.draft()
-        check_names(_names(plotted), STATISTICS, "statistic")
+        check_names(names_in(plotted), STATISTICS, "statistic")
         sampling = None
         if sample is None:
             variants = read_variants(vary, named)
@@ -138,7 +140,7 @@ def sweep(
             sampling,
             full_report=reports,
             only_statistics=only_statistics,
-            histories=_names(histories),
+            histories=names_in(histories),
             force=runs.force,
         )
         return made, options
@@ -152,7 +154,7 @@ def sweep(
     if own is not None:
         return verdict(made.run_part(own, comm, options), "sweep")
     command = f"catenary sweep {words.case}"
-    found = made.run(comm, options, command, _names(plotted), histogram)
+    found = made.run(comm, options, command, names_in(plotted), histogram)
     print_findings(found.text, found.files)
     return verdict(found.ended, "sweep")
 
@@ -200,7 +202,6 @@ def run_study(words: RunWords, out: Path, runs: StudyRuns, part: str | None) -> 
         return make_plan(words.case, changes, words.shortened), options
 
     comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene)
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import case_study
 
     if own is not None:
@@ -226,11 +227,6 @@ def verdict(ended: Sequence[Ended], what: str) -> int:
         + (f" and {more} more" if more > 0 else "")
     )
     return console.BROKEN
-
-
-def _names(text: str | None) -> list[str]:
-    """The names of a list with commas."""
-    return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 @serial_verb(
@@ -281,10 +277,8 @@ def merge(
     force: Force = False,
 ) -> None:
     """Serial."""
-    from catenary.base.process import alone
-    from catenary.cases.result_folder.folder_lock import held
     from catenary.cases.studies import merged_sweeps
-    from catenary.cases.studies.sweep.output import RECORD
+    from catenary.cases.studies.sweep.sweep import RECORD
     from catenary.cases.studies.uncertainty import output
 
     parts = merged_sweeps.parts_of(folders)
@@ -317,7 +311,6 @@ class TaskWords(SceneWords):
 
     def make(self, verb: str, study: Callable[..., Made]) -> int:
         """Make the study and print what it found. Serial."""
-
         from catenary.cases.scene.load import read_draft
 
         def read() -> tuple[Draft, Path]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError
+from catenary.base.parallel import launched_by_mpirun, on_root
 from catenary.cases.cli import command_words
 from catenary.cases.cli.app import (
     Force,
@@ -30,6 +31,7 @@ from catenary.cases.cli.app import (
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
+from catenary.postproc.evaluate.wording import counted
 
 if TYPE_CHECKING:
     from catenary.cases.studies.accuracy.runs import Plan
@@ -39,6 +41,8 @@ if TYPE_CHECKING:
     from catenary.cases.studies.sweep.jobs import Job
 
 _MOST_REPEATS = 99
+HARD, HARD_PAGE = "hard.csv", "hard.md"
+MAP, MAP_PICTURE = "stability_map.csv", "stability_map.png"
 
 
 @verb(
@@ -98,7 +102,6 @@ def accuracy(
     from catenary.cases.studies.accuracy import output
     from catenary.cases.studies.accuracy import runs as study
     from catenary.cases.studies.records import held_study
-    from catenary.postproc.evaluate.wording import counted
 
     with held_study(out, comm, f"catenary accuracy {words.case}") as held:
         found, ended = study.run(plan, out, comm, options)
@@ -106,9 +109,6 @@ def accuracy(
     time_of_all = f"{counted(len(ended), 'run')}, {found.wall:.0f} s"
     print_findings(f"{output.as_text(found, wanted)}\n\n{time_of_all}", files)
     return console.DONE
-
-
-TABLES = ("hard.csv", "hard.md")
 
 
 @verb(
@@ -140,7 +140,7 @@ def hard(
         from catenary.cases.studies.hard.cases import hard_cases
 
         if out is not None:
-            refuse_table(out / TABLES[0], runs.force)
+            refuse_table(out / HARD, runs.force)
         return hard_cases(names)
 
     comm, cases, options = runs.begin(lambda: (read(), []), lambda cases: cases[0].scene())
@@ -149,7 +149,6 @@ def hard(
     from catenary.cases.studies.hard import checks
     from catenary.cases.studies.records import held_study
     from catenary.cases.terminal.runs_bar import RunsBar
-    from catenary.postproc.evaluate.wording import counted
     from catenary.postproc.report.study_table import remark_lines
 
     if comm.size > 1 and runs.n_jobs != 1:
@@ -170,11 +169,10 @@ def hard(
                 bar.say("\n".join(checks.line(row) for row in rows))
                 bar.ended()
                 found += rows
-        table, page = TABLES
         files = held.write(
             lambda: {
-                table: checks.criteria(found, remarks_of),
-                page: checks.page(cases, found, remarks_of),
+                HARD: checks.criteria(found, remarks_of),
+                HARD_PAGE: checks.page(cases, found, remarks_of),
             }
         )
     failed = [row for row in found if not row.passed]
@@ -188,9 +186,6 @@ def hard(
         f"{len(found) - len(failed)} of {len(found)} limits kept"
     )
     return console.NOT_ACCEPTED if failed else console.DONE
-
-
-MAP, MAP_PICTURE = "stability_map.csv", "stability_map.png"
 
 
 @serial_verb(
@@ -253,7 +248,6 @@ def scaling(
     ] = None,
 ) -> int:
     """Collective."""
-    from catenary.base.parallel import launched_by_mpirun, on_root
     from catenary.cases.run.cluster import Wire, Work, work_of
     from catenary.cases.studies import scaling as study
     from catenary.cases.studies.sweep.variants import whole_numbers
@@ -400,24 +394,22 @@ def validate(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.reference import validation as study
+    from catenary.cases.studies.reference import validation
 
-    def read() -> tuple[tuple[list[Job], study.Step], list[str]]:
+    def read() -> tuple[tuple[list[Job], validation.Step], list[str]]:
         refuse_table(out / "validation.csv", runs.force)
-        return (study.jobs_of_validation(), study.line_test(measured)), []
+        return (validation.jobs_of_validation(), validation.line_test(measured)), []
 
     comm, (jobs, tested), options = runs.begin(read, lambda made: made[0][0].scene)
-    from catenary.base.parallel import on_root
     from catenary.cases.studies.accuracy.runs import RUNS
     from catenary.cases.studies.records import held_study
-    from catenary.cases.studies.reference import validation
     from catenary.cases.studies.reference.judgement import any_failed
     from catenary.cases.studies.sweep.jobs import all_ended
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
     with held_study(out, comm, "catenary validate") as held:
         ended = all_ended(run_jobs(jobs, out / RUNS, comm, options), "validation")
-        found = on_root(comm, lambda: study.validate(ended, tested), takes_long=True)
+        found = on_root(comm, lambda: validation.validate(ended, tested), takes_long=True)
         files = held.write(lambda: validation.validation_files(found))
     print_findings(validation.validation_text(found), files)
     return console.NOT_ACCEPTED if strict and any_failed(found.rows) else console.DONE

@@ -45,6 +45,11 @@ def shown(value: Any) -> str:
     return plain(_as_toml(value), _SHOWN)
 
 
+def shown_word(word: str) -> str:
+    """A word as `shown`, without its quotes unless it is empty."""
+    return shown(word)[1:-1] or shown(word)
+
+
 def _as_toml(value: Any, depth: int = 0) -> str:
     """A value as TOML has it; of what is long or deep, the beginning."""
     if isinstance(value, bool):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.faults import shown
+from catenary.cases.scene.input.faults import shown_word
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -238,8 +238,7 @@ def parse_axes(text: str | None) -> list[Axis]:
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in AXES:
-            told = shown(name)[1:-1] or shown(name)
-            raise InputError(f"--axes {told} is unknown; there are {', '.join(AXES)}")
+            raise InputError(f"--axes {shown_word(name)} is unknown; there are {', '.join(AXES)}")
         if names.count(name) > 1:
             raise InputError(f"--axes names {name} twice")
     return [AXES[name] for name in names]

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from catenary.base.mpi import MPI
 from catenary.base.parallel import on_root
 from catenary.cases.process.workers import WorkerLost
 from catenary.cases.scene.scene import resolved
@@ -141,7 +142,6 @@ def check_cases(
 
 def _checked(short: bool, case: HardCase, comm: Any) -> Checked:
     """Measures of a hard case. Collective."""
-    from catenary.base.mpi import MPI
 
     one = _OneCase(case, MPI.COMM_SELF, short)
     checked: Checked = on_root(comm, one.checked, takes_long=True)

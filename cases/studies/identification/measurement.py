@@ -31,6 +31,18 @@ from catenary.cases.studies.measured import (
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.filters import power_kept
 
+# The slowest pole decays with sin(pi/12) 2 pi fc, so that 1e-8 is left after so many periods.
+_REMEMBERED = 12.0
+FORCE, HEIGHT = "force", "head height"
+UNITS = {FORCE: "N", HEIGHT: "m"}
+_MOST_SAMPLES = 8000  # their covariance takes half a gigabyte
+# Raw samples that half a period of the filter takes at least. Of fewer all would be kept, and the
+# filter leaves nothing at half of their rate: the covariance of their noise is singular.
+_RAW = 2.0
+# Of what is faster than so many cut-offs the filter leaves 0.8 %, of the noise's deviation 0.2 %;
+# values with more than these parts, of their deviation and of the noise's, have not passed it.
+_FAST, _OF_VALUES, _OF_NOISE = 1.5, 0.01, 0.1
+
 
 class Sought(Table):
     """A parameter that is looked for.
@@ -92,10 +104,6 @@ class Task(Table):
         return self
 
 
-# The slowest pole decays with sin(pi/12) 2 pi fc, so that 1e-8 is left after so many periods.
-_REMEMBERED = 12.0
-
-
 def correlation(lags: np.ndarray, cut_off: float, dt: float | None = None) -> np.ndarray:
     """Correlation (n,) of white noise that passed the filter of `filters.low_pass`.
 
@@ -135,19 +143,6 @@ class Whitening:
     def of(self, values: np.ndarray) -> np.ndarray:
         """Values (n,) or (n, m), divided by the square root of their covariance."""
         return np.asarray(linalg.solve_triangular(self._factor, values, lower=True))
-
-
-FORCE, HEIGHT = "force", "head height"
-UNITS = {FORCE: "N", HEIGHT: "m"}
-_MOST_SAMPLES = 8000  # their covariance takes half a gigabyte
-# Raw samples that half a period of the filter takes at least. Of fewer all would be kept, and the
-# filter leaves nothing at half of their rate: the covariance of their noise is singular.
-_RAW = 2.0
-# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
-_SETTLED = 6.0
-# Of what is faster than so many cut-offs the filter leaves 0.8 %, of the noise's deviation 0.2 %;
-# values with more than these parts, of their deviation and of the noise's, have not passed it.
-_FAST, _OF_VALUES, _OF_NOISE = 1.5, 0.01, 0.1
 
 
 @dataclass(frozen=True)
@@ -228,7 +223,7 @@ class Measurement:
                 f"measured.filter_Hz = {task.filter_Hz:g} takes {least}"
             )
         if not task.is_filtered:
-            margin = int(np.ceil(_SETTLED / (task.filter_Hz * dt)))
+            margin = int(np.ceil(filters.SETTLED / (task.filter_Hz * dt)))
             within = within[(within >= margin) & (within < len(places) - margin)]
         # A signal of this bandwidth is known from samples half a period of it apart.
         kept = within[:: max(1, int(dense + 1e-6))]
@@ -271,7 +266,7 @@ class Measurement:
         if 2.0 * fast * self._spacing >= 1.0:
             return ""
         rest = values - filters.low_pass(values, self._spacing, fast)
-        margin = int(np.ceil(_SETTLED / (fast * self._spacing)))
+        margin = int(np.ceil(filters.SETTLED / (fast * self._spacing)))
         inside = rest[margin : rest.size - margin]
         deviation = float(np.std(inside if inside.size else rest))
         if deviation < max(_OF_VALUES * float(np.std(values)), _OF_NOISE * noise):

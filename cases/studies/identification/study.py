@@ -49,117 +49,6 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import Tangents, march_with_tangents
 from catenary.solver.tangents.set_up import Change, SetUp, set_up_of
 
-
-class FittedMarch:
-    """Marches of a scene whose parameters are changed. Not collective: one process.
-
-    Parameters
-    ----------
-    scenes : the scene, unchanged
-    parameters : m of it
-    measurement : which samples of a march are compared
-    comm : mpi4py communicator of this process alone
-    """
-
-    def __init__(
-        self,
-        scenes: ChangedScenes,
-        parameters: Sequence[Parameter],
-        measurement: Measurement,
-        comm: Any,
-    ) -> None:
-        self._scenes, self._parameters = scenes, parameters
-        self._measurement, self._comm = measurement, comm
-        self._kept: dict[str, Change] = {}
-
-    def values(self, by: Sequence[float]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Samples (n,) of each signal, with the parameters changed ``by`` (m,) in their units, and
-        the places and values (2, k) of its steps between them.
-
-        Raises
-        ------
-        InputError
-            If the scene refuses these values.
-        RunBroken
-            If the march breaks.
-        """
-        marched = march_with_tangents(self._comm, self._at_rest(by), [])
-        position, dt = marched.position[:, self._number], marched.dt
-        of_all = [values for values, _ in self._signals(marched)]
-        samples = [self._measurement.of_march(position, one, dt) for one in of_all]
-        return samples, [self._measurement.curve_of_march(position, one, dt) for one in of_all]
-
-    def derivatives(self, by: Sequence[float]) -> list[np.ndarray]:
-        """Derivatives (n, m) of the samples of each signal by the parameters, per their units.
-
-        Raises
-        ------
-        InputError
-            Also if a parameter is none that a march can be differentiated by.
-        """
-        at_rest = self._at_rest(by)
-        now = set_up_of(self._comm, at_rest)
-        changes = self._changes(by, at_rest, now)
-        parts: list[list[np.ndarray]] = []
-        for part in parts_of(changes, at_rest, now):
-            marched = march_with_tangents(self._comm, at_rest, changes[part])
-            position = marched.position[:, self._number]
-            parts.append(
-                [
-                    self._measurement.of_march(position, by_parameters, marched.dt)
-                    for _, by_parameters in self._signals(marched)
-                ]
-            )
-        return [np.concatenate(own, axis=1) for own in zip(*parts, strict=True)]
-
-    @property
-    def _number(self) -> int:
-        return self._measurement.pantograph
-
-    def _signals(self, marched: Tangents) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Values of each signal in all steps, and their derivatives (n_steps, m)."""
-        number, found = self._number, []
-        for signal in self._measurement.signals:
-            if signal.name == FORCE:
-                pair = (marched.force[:, number], marched.by_force[:, :, number])
-            else:
-                pair = (marched.head_height[:, number], marched.by_head_height[:, :, number])
-            found.append(pair)
-        return found
-
-    def _changed(self, by: Sequence[float]) -> Scene:
-        pairs = list(zip(self._parameters, by, strict=True))
-        try:
-            return self._scenes.all_changed(pairs)
-        except InputError as error:
-            raise InputError(
-                f"the search comes to a value that the scene refuses: {error}; mean or "
-                "deviation of its prior may be too large"
-            ) from error
-
-    def _at_rest(self, by: Sequence[float]) -> LineAtRest:
-        return sound_rest(self._changed(by))
-
-    def _changes(self, by: Sequence[float], at_rest: LineAtRest, now: SetUp) -> list[Change]:
-        """Derivatives of the set-up. Those in which the line at rest is linear are kept from the
-        first ones."""
-        scenes, changes = ChangedScenes(self._changed(by)), []
-        for parameter in self._parameters:
-            key = parameter.key
-            change = self._kept.get(key)
-            if change is None:
-                change = change_by(scenes.parameter(key), scenes, at_rest, now, self._comm)
-                if change.start.size or change.speed:
-                    raise InputError(
-                        f"{key} moves the pantograph along the track: where it was is measured, "
-                        "and no parameter of an identification"
-                    )
-                if parameter.is_of_shape:
-                    self._kept[key] = change
-            changes.append(change)
-        return changes
-
-
 # The search ends when a step makes the sum of squares, which is near the number n of samples, less
 # by less than this part. What is left of the sum is the squared distance to the best parameters in
 # posterior deviations: some 0.01 of n = 100.
@@ -232,88 +121,6 @@ class Identification:
         """Constant that was found in each signal [N or m], zero where none was looked for."""
         by_name = dict(zip((one.name for one in self.unknowns), self.values, strict=True))
         return [one.factor * float(by_name.get(_bias_of(one.name), 0.0)) for one in self.signals]
-
-
-class _Compared:
-    """Residuals and Jacobians by what is looked for, in deviations of noise and priors."""
-
-    def __init__(
-        self,
-        march: FittedMarch,
-        signals: Sequence[Signal],
-        unknowns: Sequence[Unknown],
-        offsets: np.ndarray,
-        progress: Callable[[str], None],
-    ) -> None:
-        self._march, self._signals, self._offsets = march, signals, offsets
-        self._progress = progress
-        self._deviations = np.array([one.deviation for one in unknowns[: offsets.size]])
-        self._n = len(unknowns)
-        self.n_marches, self.n_jacobians = 0, 0
-        # The latest of each with its place, which searches ask for several times.
-        self._residual: tuple[bytes, np.ndarray] | None = None
-        self._jacobian: tuple[bytes, np.ndarray] | None = None
-        self.modelled: list[np.ndarray] = []
-        self.by_priors: list[np.ndarray] = []  # the first march, with the priors' means
-        self.marched: list[np.ndarray] = []
-
-    def residual(self, at: np.ndarray) -> np.ndarray:
-        """Measured less modelled samples of all signals, made independent."""
-        if self._residual is None or self._residual[0] != at.tobytes():
-            self.n_marches += 1
-            self._residual = at.tobytes(), self._made_residual(at)
-        return self._residual[1]
-
-    def jacobian(self, at: np.ndarray) -> np.ndarray:
-        """Derivatives of the modelled samples, made independent."""
-        if self._jacobian is None or self._jacobian[0] != at.tobytes():
-            self.n_jacobians += 1
-            if self._offsets.size:
-                self._progress(f"derivatives by {counted(self._offsets.size, 'parameter')}")
-            self._jacobian = at.tobytes(), self._made_jacobian(at)
-        return self._jacobian[1]
-
-    def judged(self, found: OptimizeResult) -> dict[str, Judged]:
-        """Residuals of each signal and of "all" where a search came to."""
-        n = len(found.fun) - self._n
-        own = n // len(self._signals)
-        moved = innovations_of(found.fun[:n], -found.jac[:n], found.x)
-        names = {one.name: slice(k * own, (k + 1) * own) for k, one in enumerate(self._signals)}
-        return judge(moved, names)
-
-    def _made_residual(self, at: np.ndarray) -> np.ndarray:
-        self.modelled, self.marched = self._march.values(self._by(at))
-        if not self.by_priors:
-            self.by_priors = self.marched
-            _refuse_other_units(self._signals, self.modelled)
-        biases = iter(at[self._offsets.size :])
-        found = np.concatenate(
-            [
-                one.whitening.of(
-                    one.values - modelled - (one.bias * next(biases) if one.bias else 0.0)
-                )
-                for one, modelled in zip(self._signals, self.modelled, strict=True)
-            ]
-        )
-        self._progress(f"march {self.n_marches}: sum of squares {found @ found + at @ at:.1f}")
-        return found
-
-    def _made_jacobian(self, at: np.ndarray) -> np.ndarray:
-        found = self._march.derivatives(self._by(at)) if self._offsets.size else []
-        rows, bias = [], self._offsets.size
-        for number, one in enumerate(self._signals):
-            own = np.zeros((one.values.size, self._n))
-            if found:
-                own[:, : self._offsets.size] = found[number] * self._deviations
-            if one.bias:
-                own[:, bias] = one.bias
-                bias += 1
-            rows.append(one.whitening.of(own))
-        return np.concatenate(rows)
-
-    def _by(self, at: np.ndarray) -> list[float]:
-        """Changes of the parameters of the scene, in their units."""
-        return list(self._offsets + self._deviations * at[: self._offsets.size])
 
 
 def identify(
@@ -481,3 +288,195 @@ def _sought(scenes: ChangedScenes, task: Task) -> tuple[list[Parameter], list[Un
         if keys.count(key) > 1:
             raise InputError(f"the task names {key} twice; name it once")
     return parameters, unknowns
+
+
+class _Compared:
+    """Residuals and Jacobians by what is looked for, in deviations of noise and priors."""
+
+    def __init__(
+        self,
+        march: FittedMarch,
+        signals: Sequence[Signal],
+        unknowns: Sequence[Unknown],
+        offsets: np.ndarray,
+        progress: Callable[[str], None],
+    ) -> None:
+        self._march, self._signals, self._offsets = march, signals, offsets
+        self._progress = progress
+        self._deviations = np.array([one.deviation for one in unknowns[: offsets.size]])
+        self._n = len(unknowns)
+        self.n_marches, self.n_jacobians = 0, 0
+        # The latest of each with its place, which searches ask for several times.
+        self._residual: tuple[bytes, np.ndarray] | None = None
+        self._jacobian: tuple[bytes, np.ndarray] | None = None
+        self.modelled: list[np.ndarray] = []
+        self.by_priors: list[np.ndarray] = []  # the first march, with the priors' means
+        self.marched: list[np.ndarray] = []
+
+    def residual(self, at: np.ndarray) -> np.ndarray:
+        """Measured less modelled samples of all signals, made independent."""
+        if self._residual is None or self._residual[0] != at.tobytes():
+            self.n_marches += 1
+            self._residual = at.tobytes(), self._made_residual(at)
+        return self._residual[1]
+
+    def jacobian(self, at: np.ndarray) -> np.ndarray:
+        """Derivatives of the modelled samples, made independent."""
+        if self._jacobian is None or self._jacobian[0] != at.tobytes():
+            self.n_jacobians += 1
+            if self._offsets.size:
+                self._progress(f"derivatives by {counted(self._offsets.size, 'parameter')}")
+            self._jacobian = at.tobytes(), self._made_jacobian(at)
+        return self._jacobian[1]
+
+    def judged(self, found: OptimizeResult) -> dict[str, Judged]:
+        """Residuals of each signal and of "all" where a search came to."""
+        n = len(found.fun) - self._n
+        own = n // len(self._signals)
+        moved = innovations_of(found.fun[:n], -found.jac[:n], found.x)
+        names = {one.name: slice(k * own, (k + 1) * own) for k, one in enumerate(self._signals)}
+        return judge(moved, names)
+
+    def _made_residual(self, at: np.ndarray) -> np.ndarray:
+        self.modelled, self.marched = self._march.values(self._by(at))
+        if not self.by_priors:
+            self.by_priors = self.marched
+            _refuse_other_units(self._signals, self.modelled)
+        biases = iter(at[self._offsets.size :])
+        found = np.concatenate(
+            [
+                one.whitening.of(
+                    one.values - modelled - (one.bias * next(biases) if one.bias else 0.0)
+                )
+                for one, modelled in zip(self._signals, self.modelled, strict=True)
+            ]
+        )
+        self._progress(f"march {self.n_marches}: sum of squares {found @ found + at @ at:.1f}")
+        return found
+
+    def _made_jacobian(self, at: np.ndarray) -> np.ndarray:
+        found = self._march.derivatives(self._by(at)) if self._offsets.size else []
+        rows, bias = [], self._offsets.size
+        for number, one in enumerate(self._signals):
+            own = np.zeros((one.values.size, self._n))
+            if found:
+                own[:, : self._offsets.size] = found[number] * self._deviations
+            if one.bias:
+                own[:, bias] = one.bias
+                bias += 1
+            rows.append(one.whitening.of(own))
+        return np.concatenate(rows)
+
+    def _by(self, at: np.ndarray) -> list[float]:
+        """Changes of the parameters of the scene, in their units."""
+        return list(self._offsets + self._deviations * at[: self._offsets.size])
+
+
+class FittedMarch:
+    """Marches of a scene whose parameters are changed. Not collective: one process.
+
+    Parameters
+    ----------
+    scenes : the scene, unchanged
+    parameters : m of it
+    measurement : which samples of a march are compared
+    comm : mpi4py communicator of this process alone
+    """
+
+    def __init__(
+        self,
+        scenes: ChangedScenes,
+        parameters: Sequence[Parameter],
+        measurement: Measurement,
+        comm: Any,
+    ) -> None:
+        self._scenes, self._parameters = scenes, parameters
+        self._measurement, self._comm = measurement, comm
+        self._kept: dict[str, Change] = {}
+
+    def values(self, by: Sequence[float]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Samples (n,) of each signal, with the parameters changed ``by`` (m,) in their units, and
+        the places and values (2, k) of its steps between them.
+
+        Raises
+        ------
+        InputError
+            If the scene refuses these values.
+        RunBroken
+            If the march breaks.
+        """
+        marched = march_with_tangents(self._comm, self._at_rest(by), [])
+        position, dt = marched.position[:, self._number], marched.dt
+        of_all = [values for values, _ in self._signals(marched)]
+        samples = [self._measurement.of_march(position, one, dt) for one in of_all]
+        return samples, [self._measurement.curve_of_march(position, one, dt) for one in of_all]
+
+    def derivatives(self, by: Sequence[float]) -> list[np.ndarray]:
+        """Derivatives (n, m) of the samples of each signal by the parameters, per their units.
+
+        Raises
+        ------
+        InputError
+            Also if a parameter is none that a march can be differentiated by.
+        """
+        at_rest = self._at_rest(by)
+        now = set_up_of(self._comm, at_rest)
+        changes = self._changes(by, at_rest, now)
+        parts: list[list[np.ndarray]] = []
+        for part in parts_of(changes, at_rest, now):
+            marched = march_with_tangents(self._comm, at_rest, changes[part])
+            position = marched.position[:, self._number]
+            parts.append(
+                [
+                    self._measurement.of_march(position, by_parameters, marched.dt)
+                    for _, by_parameters in self._signals(marched)
+                ]
+            )
+        return [np.concatenate(own, axis=1) for own in zip(*parts, strict=True)]
+
+    @property
+    def _number(self) -> int:
+        return self._measurement.pantograph
+
+    def _signals(self, marched: Tangents) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Values of each signal in all steps, and their derivatives (n_steps, m)."""
+        number, found = self._number, []
+        for signal in self._measurement.signals:
+            if signal.name == FORCE:
+                pair = (marched.force[:, number], marched.by_force[:, :, number])
+            else:
+                pair = (marched.head_height[:, number], marched.by_head_height[:, :, number])
+            found.append(pair)
+        return found
+
+    def _changed(self, by: Sequence[float]) -> Scene:
+        pairs = list(zip(self._parameters, by, strict=True))
+        try:
+            return self._scenes.all_changed(pairs)
+        except InputError as error:
+            raise InputError(
+                f"the search comes to a value that the scene refuses: {error}; mean or "
+                "deviation of its prior may be too large"
+            ) from error
+
+    def _at_rest(self, by: Sequence[float]) -> LineAtRest:
+        return sound_rest(self._changed(by))
+
+    def _changes(self, by: Sequence[float], at_rest: LineAtRest, now: SetUp) -> list[Change]:
+        """Derivatives of the set-up. Those in which the line at rest is linear are kept from the
+        first ones."""
+        scenes, changes = ChangedScenes(self._changed(by)), []
+        for parameter in self._parameters:
+            key = parameter.key
+            change = self._kept.get(key)
+            if change is None:
+                change = change_by(scenes.parameter(key), scenes, at_rest, now, self._comm)
+                if change.start.size or change.speed:
+                    raise InputError(
+                        f"{key} moves the pantograph along the track: where it was is measured, "
+                        "and no parameter of an identification"
+                    )
+                if parameter.is_of_shape:
+                    self._kept[key] = change
+            changes.append(change)
+        return changes

@@ -41,72 +41,6 @@ _COLUMNS = (
     Column("length_mm", "length [mm]", ".1f"),
     Column("change_mm", "change [mm]", "+.1f"),
 )
-
-
-def dropper_table(shipped: Scene, optimum: Scene) -> StudyTable:
-    """A row for each dropper of the line: unstretched lengths, to which they are cut.
-
-    Both scenes have as many droppers in each span. Not collective.
-    """
-    before, after = _droppers(shipped), _droppers(optimum)
-    moved = 1e3 * (after["in_span"] - before["in_span"])
-    cut = 1e3 * before["length"], 1e3 * after["length"], 1e3 * (after["length"] - before["length"])
-    rows: list[Mapping[str, Any]] = []
-    number: dict[int, int] = {}
-    for i, span in enumerate(after["span"].tolist()):
-        number[span] = number.get(span, 0) + 1
-        figures = (after["in_span"][i], moved[i], *(own[i] for own in cut))
-        cells = (span + 1, number[span], after["wires"][i], *map(float, figures))
-        rows.append(dict(zip((column.name for column in _COLUMNS), cells, strict=True)))
-    return StudyTable(_COLUMNS, rows, "Lengths of droppers")
-
-
-def of_middle_span(table: StudyTable) -> StudyTable:
-    """The rows of the span in the middle of those with droppers: those at the ends hang
-    otherwise."""
-    spans = sorted({int(row["span"]) for row in table.rows})
-    span = spans[len(spans) // 2]
-    rows = [row for row in table.rows if row["span"] == span]
-    return StudyTable(table.columns, rows, f"Lengths of droppers in span {span}")
-
-
-def _droppers(scene: Scene) -> dict[str, Any]:
-    """Spans, places in them, lengths and wires of all droppers along the track."""
-    table = static_table(scene)
-    order = np.argsort(table["dropper_x"], kind="stable")
-    span = table["dropper_span"].astype(int)[order]
-    ends = (table[f"dropper_{end}"][order].astype(str) for end in ("upper", "lower"))
-    return {
-        "span": span,
-        "in_span": table["dropper_x"][order] - table["support_x"][span],
-        "length": table["dropper_length"][order],
-        "wires": [f"{upper} to {lower}" for upper, lower in zip(*ends, strict=True)],
-    }
-
-
-def least_forces(scene: Scene) -> np.ndarray:
-    """The least force at rest of the first, second, ... droppers of all spans [N].
-
-    Forces are linear in pre-sag, so that a search which knows their slopes takes no step to a line
-    that cannot hang. Not collective.
-
-    Raises
-    ------
-    InputError
-        If the line cannot hang.
-    """
-    problem, mesh = problem_of(scene), mesh_of(scene)
-    form = stable_form(problem, mesh)[1]
-    x, masts = mesh.x(mesh.droppers[:, 1]), problem.line.support_positions
-    order = np.argsort(x, kind="stable")
-    span = np.searchsorted(masts, x[order], side="right")
-    first = np.searchsorted(span, span)  # where the droppers of each one's span begin
-    number = np.arange(span.size) - first
-    found = np.full(int(number.max(initial=-1)) + 1, np.inf)
-    np.minimum.at(found, number, form.dropper_force[order])
-    return found
-
-
 # A violation of a constraint smaller than this share of its scale is round-off of a search.
 SLACK = 1e-6
 # Scale of forces of droppers at rest [N].
@@ -117,6 +51,13 @@ _OF_STEP = 0.05
 _LEAST_REST = 0.05
 # Of the shipped value: the objective of a point whose runs broke, which a search leaves again.
 _OF_BROKEN = 10.0
+# Greatest first standard deviation of the evolution strategy, over the width of the bounds.
+_FIRST_SPREAD = 0.15
+_MOST_ITERATIONS = 200
+# Iterations of SLSQP that must gain something together.
+_FRUITLESS = 3
+# Objective of points that violate constraints: they rank behind all that do not.
+_BEHIND = 1e3
 
 
 class Spent(Exception):
@@ -390,15 +331,6 @@ def _moved(change: np.ndarray, i: int, by: float) -> np.ndarray:
     return found
 
 
-# Greatest first standard deviation of the evolution strategy, over the width of the bounds.
-_FIRST_SPREAD = 0.15
-_MOST_ITERATIONS = 200
-# Iterations of SLSQP that must gain something together.
-_FRUITLESS = 3
-# Objective of points that violate constraints: they rank behind all that do not.
-_BEHIND = 1e3
-
-
 def search(problem: Problem, method: str, table: SearchTable) -> Point:
     """The best point that a method finds from the case as shipped. Not collective."""
     methods = {GRADIENT: _by_gradient, CMA: _by_evolution}
@@ -526,3 +458,67 @@ def _rank(point: Point, scale: float) -> float:
     if point.broke:
         return 10.0 * _BEHIND
     return _BEHIND + point.violation if point.violation else point.value / scale
+
+
+def dropper_table(shipped: Scene, optimum: Scene) -> StudyTable:
+    """A row for each dropper of the line: unstretched lengths, to which they are cut.
+
+    Both scenes have as many droppers in each span. Not collective.
+    """
+    before, after = _droppers(shipped), _droppers(optimum)
+    moved = 1e3 * (after["in_span"] - before["in_span"])
+    cut = 1e3 * before["length"], 1e3 * after["length"], 1e3 * (after["length"] - before["length"])
+    rows: list[Mapping[str, Any]] = []
+    number: dict[int, int] = {}
+    for i, span in enumerate(after["span"].tolist()):
+        number[span] = number.get(span, 0) + 1
+        figures = (after["in_span"][i], moved[i], *(own[i] for own in cut))
+        cells = (span + 1, number[span], after["wires"][i], *map(float, figures))
+        rows.append(dict(zip((column.name for column in _COLUMNS), cells, strict=True)))
+    return StudyTable(_COLUMNS, rows, "Lengths of droppers")
+
+
+def of_middle_span(table: StudyTable) -> StudyTable:
+    """The rows of the span in the middle of those with droppers: those at the ends hang
+    otherwise."""
+    spans = sorted({int(row["span"]) for row in table.rows})
+    span = spans[len(spans) // 2]
+    rows = [row for row in table.rows if row["span"] == span]
+    return StudyTable(table.columns, rows, f"Lengths of droppers in span {span}")
+
+
+def _droppers(scene: Scene) -> dict[str, Any]:
+    """Spans, places in them, lengths and wires of all droppers along the track."""
+    table = static_table(scene)
+    order = np.argsort(table["dropper_x"], kind="stable")
+    span = table["dropper_span"].astype(int)[order]
+    ends = (table[f"dropper_{end}"][order].astype(str) for end in ("upper", "lower"))
+    return {
+        "span": span,
+        "in_span": table["dropper_x"][order] - table["support_x"][span],
+        "length": table["dropper_length"][order],
+        "wires": [f"{upper} to {lower}" for upper, lower in zip(*ends, strict=True)],
+    }
+
+
+def least_forces(scene: Scene) -> np.ndarray:
+    """The least force at rest of the first, second, ... droppers of all spans [N].
+
+    Forces are linear in pre-sag, so that a search which knows their slopes takes no step to a line
+    that cannot hang. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the line cannot hang.
+    """
+    problem, mesh = problem_of(scene), mesh_of(scene)
+    form = stable_form(problem, mesh)[1]
+    x, masts = mesh.x(mesh.droppers[:, 1]), problem.line.support_positions
+    order = np.argsort(x, kind="stable")
+    span = np.searchsorted(masts, x[order], side="right")
+    first = np.searchsorted(span, span)  # where the droppers of each one's span begin
+    number = np.arange(span.size) - first
+    found = np.full(int(number.max(initial=-1)) + 1, np.inf)
+    np.minimum.at(found, number, form.dropper_force[order])
+    return found

@@ -36,6 +36,10 @@ GRADIENT, CMA = "gradient", "cma"
 Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
 _Number = Annotated[int, Field(ge=1, le=10_000)]
 _Alike = Annotated[list[_Number], Field(min_length=1)]
+# Keys whose entries are places along a span: of two that are symmetric one moves against the other.
+_PLACES = "positions_m"
+# Finite differences take this share of the width of the bounds.
+_USUAL_STEP = 0.02
 
 
 def _in_one_sentence(given: Any, check: ValidatorFunctionWrapHandler) -> Any:
@@ -182,12 +186,6 @@ class OptimiseTask(Table):
             own = [one for one in self.constraints if one.of_shipped == kind]
             refuse_contradictions(own, "constraints", are_shares=kind is not None)
         return self
-
-
-# Keys whose entries are places along a span: of two that are symmetric one moves against the other.
-_PLACES = "positions_m"
-# Finite differences take this share of the width of the bounds.
-_USUAL_STEP = 0.02
 
 
 class Component(NamedTuple):

@@ -44,6 +44,132 @@ from catenary.postproc.report.study_table import Column, StudyTable, texts_table
 from catenary.solver.statics.form_finding import find_form
 
 Words = dict[str, str]
+# Result folders by damping and train, and figures of the same runs, to pictures.
+Draw = Callable[[Mapping[str, Mapping[str, Path]], Rows], list[StudyFigure]]
+_NAMED = 4  # variations that a reason names
+_BY_READING = ("mean_N", "std_N", "std_percent", "max_N", "min_N", "loss_percent", "uplift_mm",
+               "slack_before", "slack_after")  # fmt: skip
+
+
+def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Study:
+    """Verdicts under each reading, the search, the ranking of inputs, and pictures.
+
+    Parameters
+    ----------
+    runs : by name, those that broke included; what was not run of the table is left out
+    draw : makes pictures of the runs of a reading that are done
+    """
+    table, statements = study.table, statements_of(study.table)
+    readings = [
+        one
+        for one in table["readings"]
+        if run_name(one["name"], study.dampings[0], study.trains[0]) in runs
+    ]
+    rows = {one["name"]: study.rows(runs, one["name"]) for one in readings}
+    found = {name: judge(statements, own) for name, own in rows.items()}
+    first, *others = readings
+    start = rows[first["name"]].only(study.trains[:1])
+    ranked = rank(start, dict(study.rows_of_variations(runs)), study)
+    named = judge(statements, rows[first["name"]].only(study.named_trains))
+    explained = []
+    for i, one in enumerate(found[first["name"]]):
+        elsewhere = {other["title"]: found[other["name"]][i] for other in others}
+        explained.append(_explained(one, named[i], elsewhere, statements[i], ranked))
+    shown = [one for one in readings if one.get("figures")]
+    judged = [
+        Reading(one["name"], one["title"], changes_of(one), found[one["name"]]) for one in readings
+    ]
+    judged[0] = replace(judged[0], findings=explained)
+    tables = [
+        _side_by_side(shown, found),
+        _search_table(study, statements, _searched(study, runs)),
+        *(_table_of(one, rows[one["name"]]) for one in readings),
+        separation_table(study, _bands(study, runs, readings, rows)),
+        ranking_table(study, ranked),
+    ]
+    pictures = _drawn(study, runs, shown, rows, draw)
+    return Study(table["title"], table["lead"], judged, tables, pictures)
+
+
+def _drawn(
+    study: PaperStudy,
+    runs: Mapping[str, StudyRun],
+    shown: Sequence[Mapping[str, Any]],
+    rows: Mapping[str, Rows],
+    draw: Draw,
+) -> list[StudyFigure]:
+    """The pictures of all readings that are to be shown, beside each other."""
+    drawn: list[tuple[str, StudyFigure]] = []
+    for number, reading in enumerate(shown):
+        folders = {
+            damping: {
+                train: run.folder
+                for train in study.trains
+                if (run := runs.get(run_name(reading["name"], damping, train))) is not None
+                and run.ended.done
+            }
+            for damping in study.dampings
+        }
+        for one in draw(folders, rows[reading["name"]]):
+            renamed = replace(
+                one,
+                name=f"{one.name}_{reading['name']}",
+                caption=f"{one.caption[:-1]}: {reading['title']}.",
+            )
+            drawn.append((one.name, renamed if number else one))
+    return [one for _, one in sorted(drawn, key=lambda pair: pair[0])]
+
+
+def _explained(
+    finding: Finding,
+    named: Finding,
+    others: Mapping[str, Finding],
+    statement: Statement,
+    ranked: Sequence[Ranked],
+) -> Finding:
+    """The finding with the reason that the runs give where it differs from the paper."""
+    if finding.verdict != NOT_REPRODUCED:
+        return finding
+    parts = []
+    if named.found != finding.found:
+        parts.append(
+            f"With only the separations that the text names: {named.verdict} ({named.found})."
+        )
+    met = {title: one for title, one in others.items() if one.verdict == REPRODUCED}
+    parts += [f"Reproduced with {title}: {one.found}." for title, one in met.items()]
+    if others and not met:
+        parts.append(f"None of the {len(others)} other readings reproduces it.")
+    return replace(finding, reason=" ".join([*parts, movers(statement, ranked)]).strip())
+
+
+def _side_by_side(
+    readings: Sequence[Mapping[str, Any]], found: Mapping[str, Sequence[Finding]]
+) -> StudyTable:
+    """All statements under some readings, each with its figures."""
+    columns = [found[one["name"]] for one in readings]
+    met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
+    notes = [
+        f"{reading['title']}: {n} of {len(column)} reproduced"
+        for reading, n, column in zip(readings, met, columns, strict=True)
+    ]
+    heads = ["no.", "statement", *(reading["title"] for reading in readings)]
+    rows = [
+        [one[0].number, one[0].statement, *(f"{own.verdict}: {own.found}" for own in one)]
+        for one in zip(*columns, strict=True)
+    ]
+    title = "The statements beside each other"
+    return texts_table(heads, rows, title=title, note=f"{'; '.join(notes)}.")
+
+
+def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:
+    """All pantographs of a reading."""
+    changes = " ".join(changes_of(reading))
+    broke = [{**run, "place": "", "outcome": "there is no such run"} for run in rows.missing]
+    columns = [Column(name, name) for name in ("train", "damping")]
+    columns += [Column("place", "pantograph"), *(FIGURES[name] for name in _BY_READING)]
+    title = f"All configurations: {reading['title']}"
+    note = f"Changes: {changes}." if changes else "No changes."
+    return StudyTable(columns, [*rows.rows, *broke], title, note)
 
 
 class Condition(Table):
@@ -139,13 +265,13 @@ def judge(statements: Sequence[Statement], rows: Rows) -> list[Finding]:
     return findings
 
 
-def holds_alone(statement: Statement, rows: Rows) -> bool:
+def _holds_alone(statement: Statement, rows: Rows) -> bool:
     """Whether a single pantograph meets a statement, as far as it is about one."""
     there = [one for one in statement.conditions if _selected(one, rows)]
     return all(_judged(one, rows).holds for one in there)
 
 
-def n_met(statement: Statement, rows: Rows) -> tuple[int, int]:
+def _n_met(statement: Statement, rows: Rows) -> tuple[int, int]:
     """Number of pantographs that keep the bounds of a statement's conditions, and of all."""
     kept = [
         one.met_by(row[one.figure])
@@ -225,142 +351,11 @@ def _judged(condition: Condition, rows: Rows) -> _Found:
     )
 
 
-# Result folders by damping and train, and figures of the same runs, to pictures.
-Draw = Callable[[Mapping[str, Mapping[str, Path]], Rows], list[StudyFigure]]
-_NAMED = 4  # variations that a reason names
-_BY_READING = ("mean_N", "std_N", "std_percent", "max_N", "min_N", "loss_percent", "uplift_mm",
-               "slack_before", "slack_after")  # fmt: skip
-
-
 class Ranked(NamedTuple):
     """A variation, or the case without title, and its rows of one pantograph."""
 
     title: str
     rows: Rows
-
-
-def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Study:
-    """Verdicts under each reading, the search, the ranking of inputs, and pictures.
-
-    Parameters
-    ----------
-    runs : by name, those that broke included; what was not run of the table is left out
-    draw : makes pictures of the runs of a reading that are done
-    """
-    table, statements = study.table, statements_of(study.table)
-    readings = [
-        one
-        for one in table["readings"]
-        if run_name(one["name"], study.dampings[0], study.trains[0]) in runs
-    ]
-    rows = {one["name"]: study.rows(runs, one["name"]) for one in readings}
-    found = {name: judge(statements, own) for name, own in rows.items()}
-    first, *others = readings
-    start = rows[first["name"]].only(study.trains[:1])
-    ranked = rank(start, dict(study.rows_of_variations(runs)), study)
-    named = judge(statements, rows[first["name"]].only(study.named_trains))
-    explained = []
-    for i, one in enumerate(found[first["name"]]):
-        elsewhere = {other["title"]: found[other["name"]][i] for other in others}
-        explained.append(_explained(one, named[i], elsewhere, statements[i], ranked))
-    shown = [one for one in readings if one.get("figures")]
-    judged = [
-        Reading(one["name"], one["title"], changes_of(one), found[one["name"]]) for one in readings
-    ]
-    judged[0] = replace(judged[0], findings=explained)
-    tables = [
-        _side_by_side(shown, found),
-        search_table(study, statements, _searched(study, runs)),
-        *(_table_of(one, rows[one["name"]]) for one in readings),
-        separation_table(study, _bands(study, runs, readings, rows)),
-        ranking_table(study, ranked),
-    ]
-    pictures = _drawn(study, runs, shown, rows, draw)
-    return Study(table["title"], table["lead"], judged, tables, pictures)
-
-
-def _drawn(
-    study: PaperStudy,
-    runs: Mapping[str, StudyRun],
-    shown: Sequence[Mapping[str, Any]],
-    rows: Mapping[str, Rows],
-    draw: Draw,
-) -> list[StudyFigure]:
-    """The pictures of all readings that are to be shown, beside each other."""
-    drawn: list[tuple[str, StudyFigure]] = []
-    for number, reading in enumerate(shown):
-        folders = {
-            damping: {
-                train: run.folder
-                for train in study.trains
-                if (run := runs.get(run_name(reading["name"], damping, train))) is not None
-                and run.ended.done
-            }
-            for damping in study.dampings
-        }
-        for one in draw(folders, rows[reading["name"]]):
-            renamed = replace(
-                one,
-                name=f"{one.name}_{reading['name']}",
-                caption=f"{one.caption[:-1]}: {reading['title']}.",
-            )
-            drawn.append((one.name, renamed if number else one))
-    return [one for _, one in sorted(drawn, key=lambda pair: pair[0])]
-
-
-def _explained(
-    finding: Finding,
-    named: Finding,
-    others: Mapping[str, Finding],
-    statement: Statement,
-    ranked: Sequence[Ranked],
-) -> Finding:
-    """The finding with the reason that the runs give where it differs from the paper."""
-    if finding.verdict != NOT_REPRODUCED:
-        return finding
-    parts = []
-    if named.found != finding.found:
-        parts.append(
-            f"With only the separations that the text names: {named.verdict} ({named.found})."
-        )
-    met = {title: one for title, one in others.items() if one.verdict == REPRODUCED}
-    parts += [f"Reproduced with {title}: {one.found}." for title, one in met.items()]
-    if others and not met:
-        parts.append(f"None of the {len(others)} other readings reproduces it.")
-    return replace(finding, reason=" ".join([*parts, movers(statement, ranked)]).strip())
-
-
-def _side_by_side(
-    readings: Sequence[Mapping[str, Any]], found: Mapping[str, Sequence[Finding]]
-) -> StudyTable:
-    """All statements under some readings, each with its figures."""
-    columns = [found[one["name"]] for one in readings]
-    met = [sum(one.verdict == REPRODUCED for one in column) for column in columns]
-    notes = [
-        f"{reading['title']}: {n} of {len(column)} reproduced"
-        for reading, n, column in zip(readings, met, columns, strict=True)
-    ]
-    heads = ["no.", "statement", *(reading["title"] for reading in readings)]
-    rows = [
-        [one[0].number, one[0].statement, *(f"{own.verdict}: {own.found}" for own in one)]
-        for one in zip(*columns, strict=True)
-    ]
-    title = "The statements beside each other"
-    return texts_table(heads, rows, title=title, note=f"{'; '.join(notes)}.")
-
-
-def _table_of(reading: Mapping[str, Any], rows: Rows) -> StudyTable:
-    """All pantographs of a reading."""
-    changes = " ".join(changes_of(reading))
-    broke = [{**run, "place": "", "outcome": "there is no such run"} for run in rows.missing]
-    columns = [Column(name, name) for name in ("train", "damping")]
-    columns += [Column("place", "pantograph"), *(FIGURES[name] for name in _BY_READING)]
-    title = f"All configurations: {reading['title']}"
-    note = f"Changes: {changes}." if changes else "No changes."
-    return StudyTable(columns, [*rows.rows, *broke], title, note)
-
-
-# ---- which reading meets most statements ---------------------------------------------------------
 
 
 def _searched(study: PaperStudy, runs: Mapping[str, StudyRun]) -> dict[str, Rows]:
@@ -372,7 +367,7 @@ def _searched(study: PaperStudy, runs: Mapping[str, StudyRun]) -> dict[str, Rows
     return {title: rows for title, rows in found.items() if rows.rows or rows.missing}
 
 
-def search_table(
+def _search_table(
     study: PaperStudy, statements: Sequence[Statement], searched: Mapping[str, Rows]
 ) -> StudyTable:
     """The readings of a search, the best first: by statements met, then by pantographs that meet
@@ -380,7 +375,7 @@ def search_table(
     search, found = study.table["search"], []
     for title, rows in searched.items():
         met = [one.number for one in judge(statements, rows) if one.verdict == REPRODUCED]
-        kept, of = n_met(statements[search["counts"] - 1], rows)
+        kept, of = _n_met(statements[search["counts"] - 1], rows)
         cells = [_range(rows, **one) for one in search["shown"]]
         listed = ", ".join(map(str, met))
         found.append((len(met), kept, [title, len(met), listed, f"{kept} of {of}", *cells]))
@@ -404,9 +399,6 @@ def _range(rows: Rows, figure: str, where: Mapping[str, str] | None = None) -> s
         return ""
     low, high = (format(which(values), FIGURES[figure].format) for which in (min, max))
     return f"{low} to {high}"
-
-
-# ---- which input moves what ----------------------------------------------------------------------
 
 
 def rank(start: Rows, varied: Mapping[str, Rows], study: PaperStudy) -> list[Ranked]:
@@ -482,8 +474,8 @@ def movers(statement: Statement, ranked: Sequence[Ranked]) -> str:
     text = (
         f"One pantograph, {alone.damping}: {column.head} {in_words(start)} in the case; {moved}. "
     )
-    holds = holds_alone(statement, case.rows)
-    turned = [one.title for one in varied if holds_alone(statement, one.rows) != holds]
+    holds = _holds_alone(statement, case.rows)
+    turned = [one.title for one in varied if _holds_alone(statement, one.rows) != holds]
     if holds:
         text += "It satisfies the statement: the second pantograph makes the difference. "
         return text + (f"Alone it fails with {_some(turned)}." if turned else "").strip()
@@ -496,9 +488,6 @@ def _some(titles: Sequence[str]) -> str:
     """The first titles, and how many more there are."""
     more = len(titles) - _NAMED
     return "; ".join(titles[:_NAMED]) + (f" and {more} more" if more > 0 else "")
-
-
-# ---- which separation is critical ----------------------------------------------------------------
 
 
 def _bands(

@@ -28,7 +28,7 @@ from catenary.cases.studies.sweep.output import DIRECTION, remarks_of, table_of
 from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import VariedKey
 from catenary.cases.studies.sweep.variants import product as variants_of
-from catenary.postproc.evaluate.wording import counted, decimals_that_tell, fixed
+from catenary.postproc.evaluate.wording import capital, counted, decimals_that_tell, fixed
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Content, Row, StudyTable
 
@@ -329,7 +329,7 @@ def as_text(study: SpeedStudy) -> str:
     else:
         first = whole.stretches[0]
         slowest, fastest = (format(speed, speeds.form) for speed in first[:2])
-        answer = f"{hold.capitalize()} from {slowest} to {fastest} km/h"
+        answer = f"{capital(hold)} from {slowest} to {fastest} km/h"
         if first.fails_at is None:
             answer += ", the end of the range."
         else:

@@ -24,7 +24,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.scene import Scene
+from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.studies.asked import Distances
 from catenary.cases.studies.sweep.jobs import Ended, statistics_of
 from catenary.cases.studies.sweep.output import failed_criteria
@@ -175,7 +175,6 @@ def period_in(study: SeparationStudy, scene: Scene) -> Period:
     """Period of a study, and the periods that theory gives for the line of its scene. Not
     collective."""
     from catenary.cases.run.scene_mesh import mesh_of
-    from catenary.cases.scene.scene import problem_of
     from catenary.cases.studies.waves.theory import wave_theory
     from catenary.solver.statics.elasticity import middle_span
     from catenary.solver.statics.line_at_rest import line_at_rest

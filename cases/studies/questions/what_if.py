@@ -292,7 +292,7 @@ def draw_forces(a: Results, b: Results) -> Figure | None:
         )
         for p, name in enumerate(names)
     ]
-    return along_track.forces(panels, a.evaluation, f"{filters.CUT_OFF:g} Hz")
+    return along_track.overlaid_forces(panels, a.evaluation, f"{filters.CUT_OFF:g} Hz")
 
 
 def _force(run: Results, pantograph: int) -> np.ndarray:
@@ -309,4 +309,4 @@ def draw_uplift(a: Results, b: Results) -> Figure | None:
         (words, run.line("arm_x"), run.extremes("arm_uplift")[1])
         for run, words in zip((a, b), WORDS.values(), strict=True)
     ]
-    return along_track.uplifts(curves, a.evaluation)
+    return along_track.overlaid_uplifts(curves, a.evaluation)

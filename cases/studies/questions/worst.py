@@ -18,8 +18,7 @@ from catenary.cases.scene.load import recorded_scene
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
-from catenary.postproc.evaluate.statistics import slack_times
-from catenary.postproc.evaluate.wording import wire_words
+from catenary.postproc.evaluate.wording import capital, wire_words
 from catenary.postproc.read.results import Results, in_stretch
 from catenary.postproc.report.study_table import Content, StudyTable, file_table
 from catenary.solver.effects.all_effects import simulated
@@ -32,6 +31,20 @@ from catenary.solver.wind import drag_width, gust_points, upward_pressure
 _DEVIATIONS, _SHARE, _NORMAL = 3.0, 0.1, 1.4826
 # Likes of a dropper hang so close to the same share of their spans [-]; fewer than this say little.
 _SAME_SHARE, _FEWEST = 0.02, 3
+# Frequencies so close are near each other, lengths so far apart differ [-].
+_NEAR, _LONGER = 0.1, 0.05
+# A reflection that keeps less of its amplitude is no candidate [-].
+_FELT = 0.01
+# Elasticity beyond that of other spans [-], height beyond them [m] and rest force of droppers
+# beyond their likes and gusts stronger than on other spans [-] from which on these are candidates.
+_SOFTER, _HIGHER, _HEAVIER, _GUSTIER = 0.1, 5e-3, 0.5, 0.1
+# Lift under a unit force below which a contact wire is held [m/N].
+_ANCHORED = 1e-9
+_POINTS = 101  # at which profiles of spans are compared
+# Gusts so long before a pantograph comes still move the span, a period of its own motion [s].
+_BEFORE = 1.0
+NONE = "no cause found"
+_MOST_CAUSES = 4  # of a place in the text; tables have all
 
 
 class Passage(NamedTuple):
@@ -122,8 +135,8 @@ def worst_places(results: Results) -> WorstPlaces:
     names = list(results.roles)
     of_arms = _of_several(results.arm_wires())
     of_droppers = _of_several([names[wire] for wire in results.dropper_wires()[:, 1].tolist()])
-    likes = dropper_likes(results)
-    times = slack_times(results)
+    likes = _dropper_likes(results)
+    times = stats.slack_times(results)
     passed_to = _passed_to(results)
     arms, hung = (one.evaluated & (one.x <= passed_to) for one in (supports, droppers))
     # One that never carries is missing or loose, and not slack at times.
@@ -157,7 +170,7 @@ def _of_several(wires: Sequence[str]) -> list[str]:
     return [wire_words(name) if several else "" for name in wires]
 
 
-def spans_in_stretch(results: Results) -> list[int]:
+def _spans_in_stretch(results: Results) -> list[int]:
     """Numbers of the spans that lie within the evaluated stretch, from 0."""
     within = in_stretch(results.line("support_x"), *results.evaluation)
     return [int(number) for number in np.flatnonzero(within[:-1] & within[1:])]
@@ -169,7 +182,7 @@ def _passages(results: Results) -> list[Passage]:
         position, force = results.column("contact_position", p), results.column("contact_force", p)
         filtered = filters.contact_force(results, p)
         own = []
-        for span in spans_in_stretch(results):
+        for span in _spans_in_stretch(results):
             start, end = float(masts[span]), float(masts[span + 1])
             if not stats.covers(position, (start, end)):
                 continue
@@ -196,7 +209,7 @@ def stands_out(values: np.ndarray) -> list[bool | None]:
     return [bool(one) for one in beyond]
 
 
-def dropper_likes(results: Results) -> np.ndarray:
+def _dropper_likes(results: Results) -> np.ndarray:
     """Number of the group of each dropper, (n_droppers,): those at the same share of a span."""
     x, span, masts = (
         results.line("dropper_x"),
@@ -226,21 +239,6 @@ def _spots(
         for n, is_out in zip(own.tolist(), stands_out(values[own]), strict=True):
             spots.append(Spot(n, float(x[n]), wires[n], float(values[n]), median, is_out))
     return sorted(spots, key=lambda one: -one.value)
-
-
-# Frequencies so close are near each other, lengths so far apart differ [-].
-_NEAR, _LONGER = 0.1, 0.05
-# A reflection that keeps less of its amplitude is no candidate [-].
-_FELT = 0.01
-# Elasticity beyond that of other spans [-], height beyond them [m] and rest force of droppers
-# beyond their likes and gusts stronger than on other spans [-] from which on these are candidates.
-_SOFTER, _HIGHER, _HEAVIER, _GUSTIER = 0.1, 5e-3, 0.5, 0.1
-# Lift under a unit force below which a contact wire is held [m/N].
-_ANCHORED = 1e-9
-_POINTS = 101  # at which profiles of spans are compared
-# Gusts so long before a pantograph comes still move the span, a period of its own motion [s].
-_BEFORE = 1.0
-_FEWEST_LIKES = 3
 
 
 def elasticity_along(rest: LineAtRest, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
@@ -428,7 +426,7 @@ class Causes:
     def _elastic(self, span: int) -> Iterator[str]:
         """Softest and stiffest place of a span against those of the others."""
         table = self._elasticities
-        if span not in table or len(table) < _FEWEST_LIKES:
+        if span not in table or len(table) < _FEWEST:
             return
         for word, column in (("softest", 0), ("stiffest", 1)):
             at, own = table[span][column]
@@ -446,7 +444,7 @@ class Causes:
             return {}
         x, lift = self._elasticity
         found = {}
-        for span in spans_in_stretch(self._results):
+        for span in _spans_in_stretch(self._results):
             # An anchored wire does not give way; that is no elasticity of the line.
             (own,) = np.nonzero(
                 (x >= self._masts[span]) & (x <= self._masts[span + 1]) & (lift > _ANCHORED)
@@ -462,7 +460,7 @@ class Causes:
     def _profile(self, span: int) -> Iterator[str]:
         """Height of the contact wire at rest against that of other spans."""
         table = self._profiles
-        if span not in table or len(table) < _FEWEST_LIKES:
+        if span not in table or len(table) < _FEWEST:
             return
         away = table[span] - np.median(np.array(list(table.values())), axis=0)
         worst = int(np.argmax(np.abs(away)))
@@ -486,17 +484,17 @@ class Causes:
             span: np.interp(
                 self._masts[span] + share * (self._masts[span + 1] - self._masts[span]), x, height
             )
-            for span in spans_in_stretch(self._results)
+            for span in _spans_in_stretch(self._results)
         }
 
     def _droppers_at_rest(self, start: float, end: float) -> Iterator[str]:
         """Droppers that carry much more or less at rest than those at the same place of a span."""
         x, force = self._results.line("dropper_x"), self._results.static("dropper_force")
-        likes = dropper_likes(self._results)
+        likes = _dropper_likes(self._results)
         evaluated = in_stretch(x, *self._results.evaluation)
         for number in np.flatnonzero((x >= start) & (x <= end)):
             others = force[(likes == likes[number]) & evaluated]
-            usual = float(np.median(others)) if others.size >= _FEWEST_LIKES else 0.0
+            usual = float(np.median(others)) if others.size >= _FEWEST else 0.0
             if usual > 0.0 and abs(force[number] / usual - 1.0) > _HEAVIER:
                 yield (
                     f"the dropper at {x[number]:.1f} m carries {force[number]:.0f} N at rest, "
@@ -506,7 +504,7 @@ class Causes:
     def _gusts(self, span: int, pantograph: int) -> Iterator[str]:
         """Gusts that are stronger on a span when a pantograph comes than on the others."""
         found = self._gust_forces.get(pantograph, {})
-        if span not in found or len(found) < _FEWEST_LIKES:
+        if span not in found or len(found) < _FEWEST:
             return
         usual = float(np.median(list(found.values())))
         if found[span] > (1.0 + _GUSTIER) * usual:
@@ -533,10 +531,6 @@ class Causes:
         for one, force in zip(self._passages, gust_forces(self._rest, when), strict=False):
             found.setdefault(one.pantograph, {})[one.span] = force
         return found
-
-
-NONE = "no cause found"
-_MOST_CAUSES = 4  # of a place in the text; tables have all
 
 
 def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:
@@ -566,7 +560,7 @@ def answer_of(results: Results, count: int) -> tuple[str, dict[str, Content]]:
     named = False
     for (noun, by), found in worst_of_each(places, causes, names, count).items():
         named = named or any(candidates not in ([], [NONE]) for _, candidates in found)
-        lines += ["", f"{noun.capitalize()}s by {by}"]
+        lines += ["", f"{capital(noun)}s by {by}"]
         for sentence, candidates in found:
             more = len(candidates) - _MOST_CAUSES
             lines += [f"  {sentence}", *(f"    {text}" for text in candidates[:_MOST_CAUSES])]

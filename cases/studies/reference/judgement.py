@@ -26,7 +26,7 @@ from catenary.cases.studies.reference.solutions import (
     PLACE,
     QUANTITIES,
     Solution,
-    read,
+    read_solution,
     rms,
 )
 from catenary.postproc.evaluate import filters
@@ -43,8 +43,6 @@ _FAR_FROM_ZERO = (
 _QUANTITY, _VALUE, _OF, _CONFIGURATION = "quantity", "value", "of", "configuration"
 # Spacing at which extremes of a curve below 20 Hz are looked for [m].
 _FINE = 0.02
-# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
-_SETTLED = 6.0
 # EN 50317 samples forces, before they are filtered, more often in a second or in less than [m].
 _RATE, _SPACING = 200.0, 0.4
 # The filter of EN 50317 leaves 6 % of what is at so many of its cut-offs, and less beyond. Forces
@@ -56,6 +54,7 @@ _FROM_STATISTICS = {
     "stat_max_N": "stat_max", "stat_min_N": "stat_min", "max_N": "maximum", "min_N": "minimum",
     "loss_percent": "loss_percent",
 }  # fmt: skip
+PASSED, FAILED, NOT_JUDGED = "passed", "failed", "not judged"
 
 
 @dataclass
@@ -111,7 +110,7 @@ def read_results(
                     f"{name} holds no statistics: name the configuration of its forces, such as "
                     "--of ac_simple_275_one"
                 )
-            one = found.setdefault(configuration, Others(read(configuration)))
+            one = found.setdefault(configuration, Others(read_solution(configuration)))
             _add_forces(one, table, name, is_filtered)
     return list(found.values())
 
@@ -136,7 +135,7 @@ def _add_statistics(
                 f"{name} has statistics of {plain(str(row[_CONFIGURATION]), 60)}, and --of names "
                 f"{plain(own, 60)}: leave --of away"
             )
-        one = found.setdefault(own, Others(read(own)))
+        one = found.setdefault(own, Others(read_solution(own)))
         if (of, quantity) not in one.solution.figures:
             known = ", ".join(q for place, q in one.solution.figures if place == of)
             places = ", ".join(dict.fromkeys(place for place, _ in one.solution.figures))
@@ -271,7 +270,7 @@ def _remark_on_samples(one: Others, of: str, spacing: float, dt: float) -> None:
 def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:
     start, end = one.solution.stretch
     speed = (place[1] - place[0]) / dt
-    reach = _SETTLED / filters.CUT_OFF * speed
+    reach = filters.SETTLED / filters.CUT_OFF * speed
     beyond = min(start - place[0], place[-1] - end)
     if beyond < reach:
         one.remarks.append(
@@ -280,7 +279,6 @@ def _remark_on_ends(one: Others, of: str, place: np.ndarray, dt: float) -> None:
         )
 
 
-PASSED, FAILED, NOT_JUDGED = "passed", "failed", "not judged"
 COLUMNS = (
     Column("configuration", "configuration"),
     Column("of", "of"),

@@ -40,6 +40,30 @@ from catenary.postproc.report.study_table import Column, Content
 ONE, TWO = "one", "two"
 # Nothing but channels of the train is recorded; extremes of the line are kept of every step.
 RECORDED = ("output.field_every_s=0", "output.energy_every_s=0", "output.line_channels=[]")
+# Levels as places in a configuration's lists of steps and meshes, and the chains of three that have
+# one of the two alike.
+FINEST = (0, 0)
+STEP_CHAIN, MESH_CHAIN = (FINEST, (1, 0), (2, 0)), (FINEST, (0, 1), (0, 2))
+_LEVELS = (*STEP_CHAIN, *MESH_CHAIN[1:])
+LINE, UPLIFT, HISTORY = "line", "max_uplift_mm", "force_history_N"
+# Figures of a solution: of each pantograph, and of the line.
+OF_FORCE = tuple(column for column in OF_PANTOGRAPH if column.name != "arcing_percent")
+OF_LINE = (
+    STATISTICS[UPLIFT],
+    Column("elasticity_max_mm_per_N", meaning="largest elasticity in a span [mm/N]"),
+    Column("elasticity_min_mm_per_N", meaning="smallest elasticity in a span [mm/N]"),
+)
+QUANTITIES = {
+    column.name: column
+    for column in (
+        *OF_FORCE,
+        *OF_LINE,
+        Column(HISTORY, meaning="rms difference of the force, 0-20 Hz [N]"),
+    )
+}
+DATA = Path(__file__).parent / "data"
+STATISTICS_FILE, METADATA_FILE = "statistics.csv", "metadata.json"
+PLACE = "place_m"
 
 
 @dataclass(frozen=True)
@@ -84,7 +108,7 @@ class Configuration:
 
 
 @functools.cache
-def table() -> dict[str, Any]:
+def model_table() -> dict[str, Any]:
     """Models and levels as ``models.toml`` has them. Not collective."""
     return tomllib.loads(Path(__file__).with_name("models.toml").read_text(encoding="utf-8"))
 
@@ -106,8 +130,8 @@ def configurations(names: Sequence[str] = ()) -> list[Configuration]:
 
 
 def _every() -> Iterator[Configuration]:
-    levels, meshes = table()["levels"], table()["meshes"]
-    for model in table()["models"]:
+    levels, meshes = model_table()["levels"], model_table()["meshes"]
+    for model in model_table()["models"]:
         for speed in model["speeds_km_h"]:
             for train in (ONE, TWO):
                 name = f"{model['name']}_{speed:g}_{train}"
@@ -127,29 +151,6 @@ def _every() -> Iterator[Configuration]:
                 )
 
 
-# Levels as places in a configuration's lists of steps and meshes, and the chains of three that have
-# one of the two alike.
-FINEST = (0, 0)
-STEP_CHAIN, MESH_CHAIN = (FINEST, (1, 0), (2, 0)), (FINEST, (0, 1), (0, 2))
-_LEVELS = (*STEP_CHAIN, *MESH_CHAIN[1:])
-LINE, UPLIFT, HISTORY = "line", "max_uplift_mm", "force_history_N"
-# Figures of a solution: of each pantograph, and of the line.
-OF_FORCE = tuple(column for column in OF_PANTOGRAPH if column.name != "arcing_percent")
-OF_LINE = (
-    STATISTICS[UPLIFT],
-    Column("elasticity_max_mm_per_N", meaning="largest elasticity in a span [mm/N]"),
-    Column("elasticity_min_mm_per_N", meaning="smallest elasticity in a span [mm/N]"),
-)
-QUANTITIES = {
-    column.name: column
-    for column in (
-        *OF_FORCE,
-        *OF_LINE,
-        Column(HISTORY, meaning="rms difference of the force, 0-20 Hz [N]"),
-    )
-}
-
-
 def jobs_of(chosen: Sequence[Configuration]) -> list[Job]:
     """All runs of the configurations; their result files are not kept. Not collective."""
     return [job for one in chosen for job in _jobs(one)]
@@ -163,7 +164,7 @@ def run_name(one: Configuration, level: tuple[int, int], further: bool = False) 
 
 
 def _jobs(one: Configuration) -> Iterator[Job]:
-    scene, spans = one.scene(), table()["levels"]["further_spans"]
+    scene, spans = one.scene(), model_table()["levels"]["further_spans"]
     way = spans * span_lengths(scene.line)[0]
     moved = (
         f"line.n_spans={scene.line.n_spans + spans}",
@@ -201,7 +202,7 @@ def figures_of(summary: Mapping[str, Any]) -> dict[tuple[str, str], float]:
     return found
 
 
-def statistics(one: Configuration, ended: Mapping[str, Ended]) -> list[dict[str, Any]]:
+def statistics_of_solution(one: Configuration, ended: Mapping[str, Ended]) -> list[dict[str, Any]]:
     """Rows of the finest run's figures with their error bars.
 
     ``error_bar`` is the sum of those of step and mesh, grid convergence indices of three runs each
@@ -261,18 +262,13 @@ def _row(
     return {"configuration": one.name, "of": place, "quantity": quantity, **rounded}
 
 
-DATA = Path(__file__).parent / "data"
-STATISTICS_FILE, METADATA_FILE = "statistics.csv", "metadata.json"
-PLACE = "place_m"
-
-
 def files_of(chosen: Sequence[Configuration], ended: Sequence[Ended]) -> dict[str, Content]:
     """The solutions of some configurations. Not collective.
 
     Parameters
     ----------
     chosen : configurations
-    ended : all runs of ``convergence.jobs_of``
+    ended : all runs of ``jobs_of``
 
     Raises
     ------
@@ -280,7 +276,7 @@ def files_of(chosen: Sequence[Configuration], ended: Sequence[Ended]) -> dict[st
         If a run broke.
     """
     runs = all_done(ended)
-    rows = [row for one in chosen for row in statistics(one, runs)]
+    rows = [row for one in chosen for row in statistics_of_solution(one, runs)]
     content: dict[str, Content] = {STATISTICS_FILE: rows, METADATA_FILE: _metadata(chosen)}
     for one in chosen:
         content[f"{one.name}.csv"] = _forces(one, runs[run_name(one, FINEST)])
@@ -305,7 +301,7 @@ def _metadata(chosen: Sequence[Configuration]) -> dict[str, Any]:
     return {
         "licence": "CC-BY-4.0",
         "catenary": version("catenary"),
-        "further_spans": table()["levels"]["further_spans"],
+        "further_spans": model_table()["levels"]["further_spans"],
         "filter": "low-pass of EN 50317: Butterworth of order 6, 20 Hz, zero phase",
         "configurations": described,
     }
@@ -348,7 +344,7 @@ class Solution:
         return float(self.place[0]), float(self.place[-1])
 
 
-def read(name: str) -> Solution:
+def read_solution(name: str) -> Solution:
     """The shipped solution of a configuration. Not collective.
 
     Raises

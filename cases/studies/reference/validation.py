@@ -36,7 +36,7 @@ from catenary.cases.studies.reference.solutions import (
     UPLIFT,
     configurations,
     figures_of,
-    read,
+    read_solution,
 )
 from catenary.cases.studies.sweep.jobs import Ended, Job, all_done
 from catenary.cases.studies.sweep.variants import Variant
@@ -58,6 +58,11 @@ _OF_RANGES = {
     "support_uplift": UPLIFT,
 }
 _ELASTICITY = ("elasticity_max_mm_per_N", "elasticity_min_mm_per_N")
+JUDGED, VALIDATION = "judged", "validation"
+_BORROWED = (
+    "The bands of EN 50318:2018 for its reference models are not publicly known: figures are "
+    "judged by what the standard allows between a simulation and a line test."
+)
 
 
 @dataclass(frozen=True)
@@ -153,7 +158,7 @@ def validate(ended: Sequence[Ended], measured: Step) -> Validation:
     rules = limits()
     references, elasticity, models = [], [], set()
     for one in configurations():
-        figures, solution = figures_of(summaries[one.name]), read(one.name)
+        figures, solution = figures_of(summaries[one.name]), read_solution(one.name)
         at_rest = {(LINE, name): figures.pop((LINE, name)) for name in _ELASTICITY}
         references += judged(solution, figures)
         if one.model not in models:  # all configurations of a model have one line
@@ -212,13 +217,6 @@ def _reference(case: str, name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
-JUDGED, VALIDATION = "judged", "validation"
-_BORROWED = (
-    "The bands of EN 50318:2018 for its reference models are not publicly known: figures are "
-    "judged by what the standard allows between a simulation and a line test."
-)
-
-
 def rows_of(others: Sequence[Others]) -> list[dict[str, Any]]:
     """Judged rows of results of any program."""
     return [row for one in others for row in judged(one.solution, one.figures)]
@@ -245,7 +243,7 @@ def judged_files(others: Sequence[Others]) -> dict[str, Content]:
             for of, force in one.forces.items()
         ]
         if panels:
-            pictures |= figures.painted(about.name, partial(along_track.forces, panels))
+            pictures |= figures.painted(about.name, partial(along_track.overlaid_forces, panels))
         own = replace(table, rows=judged(one.solution, one.figures), title="")
         blocks: list[Text | StudyTable] = [Text(about.data), own]
         blocks += [Text(text, "remark") for text in one.remarks]

@@ -44,318 +44,10 @@ from catenary.meshgen.line import Line
 
 # No coordinate is nearer to 0 or 1: a normal quantity stays within 7 standard deviations.
 _EDGE = 1e-12
-
-
-def points(sampling: SamplingTable) -> np.ndarray:
-    """Points of the open unit cube, one a sample, uniform and with the wanted correlation.
-
-    Sobol points are scrambled (Owen 1998); with them, and with random ones, a larger ``n`` begins
-    with the same points. Samples of ``saltelli`` stand in the order of SALib: a base sample, those
-    in which one coordinate is another's, the other base sample.
-
-    Returns
-    -------
-    ndarray, shape (sampling.n_samples, number of sampling.columns)
-    """
-    from scipy.stats import qmc
-
-    n, d, seed = sampling.n, len(sampling.columns), sampling.seed
-    if sampling.method == SALTELLI:
-        from SALib.sample import sobol
-
-        found = sobol.sample(
-            problem_of(sampling.columns), n, calc_second_order=sampling.second_order, seed=seed
-        )
-    elif sampling.method == "sobol":
-        # A power of 2 keeps the balance of the sequence, and its first points are the same.
-        found = qmc.Sobol(d, seed=seed).random_base2(math.ceil(math.log2(n)))[:n]
-    elif sampling.method == "latin_hypercube":
-        found = qmc.LatinHypercube(d, seed=seed).random(n)
-    else:
-        found = np.random.default_rng(seed).random((n, d))
-    found = np.clip(found, _EDGE, 1.0 - _EDGE)
-    return _correlated(found, sampling) if sampling.correlations else found
-
-
-def problem_of(columns: Sequence[str]) -> dict[str, object]:
-    """Inputs as SALib takes them, uniform in the unit cube."""
-    bounds = [[0.0, 1.0] for _ in columns]
-    return {"num_vars": len(columns), "names": list(columns), "bounds": bounds}
-
-
-def _correlated(uniform: np.ndarray, sampling: SamplingTable) -> np.ndarray:
-    """Coordinates under a Gaussian copula.
-
-    Normal quantities with the correlation r have the rank correlation rho = 6/pi asin(r/2)
-    (Kruskal 1958, J. Am. Stat. Assoc. 53, eq. 6.3), so that r = 2 sin(pi rho/6).
-    """
-    from scipy.special import ndtr, ndtri
-
-    matrix = np.eye(uniform.shape[1])
-    columns = sampling.columns
-    for one in sampling.correlations:
-        i, j = (columns.index(key) for key in one.keys)
-        matrix[i, j] = matrix[j, i] = 2.0 * math.sin(math.pi * one.rank / 6.0)
-    try:
-        factor = np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError as error:
-        raise InputError(
-            "the correlations of the sampling contradict each other: no quantities have all of "
-            "them (their matrix is not positive definite)"
-        ) from error
-    return np.clip(ndtr(ndtri(uniform) @ factor.T), _EDGE, 1.0 - _EDGE)
-
-
-def normal_rows(seed: int, name: str, realisations: Sequence[int], n: int) -> np.ndarray:
-    """Independent standard normal numbers, a row for each realisation.
-
-    A row depends on seed, name and realisation only, so that the same one always comes again.
-
-    Parameters
-    ----------
-    seed : of the sampling
-    name : of the field
-    realisations : whole numbers
-    n : length of a row
-    """
-    # A counter-based generator (Salmon et al. 2011) is set to a key in no time.
-    philox = np.random.Philox(key=0)
-    generator, state = np.random.Generator(philox), philox.state
-    mark = zlib.crc32(name.encode())
-    rows = np.empty((len(realisations), n))
-    for row, number in zip(rows, realisations, strict=True):
-        state["state"]["key"][:] = (seed << 32 | mark, number)
-        philox.state = state
-        generator.standard_normal(out=row)
-    return rows
-
-
 # Correlated values of more places take minutes to make; so many numbers take about 1 GB as text.
 _MOST_CORRELATED, _MOST_NUMBERS = 5_000, 50_000_000
 # Samples whose fields are made at a time.
 _BATCH = 1000
-
-# Keys that place droppers, supports and spans.
-_GEOMETRY = (
-    "line.n_spans",
-    "line.span_m",
-    "line.spans_file",
-    "line.topology",
-    "line.transition",
-    "line.overlap",
-    "line.links",
-    "line.dropper.positions_m",
-    "line.dropper.count",
-    "line.dropper.spacing_m",
-    "line.dropper.patterns",
-    "line.dropper.patterns_file",
-)
-
-
-class Carrier(NamedTuple):
-    """Form in which a key of the scene takes a field.
-
-    Attributes
-    ----------
-    places : shape (n,), where the values stand along the line [m]
-    own : shape (n,), the scene's own values, to which the field is added, in the key's unit
-    text : from values of shape (n,) to the key's value as text
-    """
-
-    places: np.ndarray
-    own: np.ndarray
-    text: Callable[[np.ndarray], str]
-
-
-def fields_as_text(
-    key: str,
-    table: FieldTable,
-    scene: Scene,
-    varied: Sequence[str],
-    seed: int,
-    realisations: Sequence[int],
-    where: str,
-) -> list[str]:
-    """The values of a key that takes a field, one for each realisation, as texts of TOML.
-
-    Parameters
-    ----------
-    key : of the scene
-    table : distribution and correlation along the line
-    scene : whose line it is
-    varied : keys that vary too
-    seed : of the sampling
-    realisations : numbers of the realisations; the same number gives the same field
-    where : place of the field's table, for sentences
-
-    Raises
-    ------
-    InputError
-        If the key takes no field, if a varied key moves its places, or if it has too many of them.
-    """
-    make = _CARRIERS.get(key)
-    if make is None:
-        raise InputError(f"fields.{key} {where} takes no field; there are {', '.join(_CARRIERS)}")
-    moving = [one for one in varied if any(f"{one}.".startswith(f"{g}.") for g in _GEOMETRY)]
-    if moving:
-        raise InputError(
-            f"fields.{key} {where} cannot stand beside {moving[0]}, which moves the places of its "
-            "values; vary one of the two"
-        )
-    if (key == "defects") != isinstance(table, ChanceField):
-        raise InputError(f'fields.{key} {where} cannot be of type {table.type}; "chance" is for '
-                         "defects, and for them alone")  # fmt: skip
-    if table.at is not None and not key.endswith(".by_place"):
-        raise InputError(f"fields.{key}.at {where} is for courses along the line (by_place) only")
-    carrier = make(scene, line_of(scene), table)
-    n = len(carrier.places)
-    if n == 0:
-        raise InputError(f"fields.{key} {where} has no places: the line has no droppers")
-    if n * len(realisations) > _MOST_NUMBERS:
-        raise InputError(
-            f"fields.{key} {where} needs {len(realisations)} samples of {n} values; at most "
-            f"{_MOST_NUMBERS} values are allowed"
-        )
-    factor = _factor(key, table, carrier.places, where)
-    texts: list[str] = []
-    for begin in range(0, len(realisations), _BATCH):
-        normal = normal_rows(seed, key, realisations[begin : begin + _BATCH], n)
-        if factor is not None:
-            normal = normal @ factor.T
-        texts += map(carrier.text, carrier.own + _values(key, table, normal, where))
-    return texts
-
-
-def correlation(table: FieldTable, places: np.ndarray) -> np.ndarray:
-    """Correlation of the normal quantities behind a field, shape (n, n).
-
-    Parameters
-    ----------
-    table : with a correlation length above 0
-    places : shape (n,) [m]
-    """
-    distance = np.abs(places[:, None] - places) / table.correlation_length_m
-    return np.asarray(np.exp(-distance if table.correlation == "exponential" else -(distance**2)))
-
-
-def _factor(key: str, table: FieldTable, places: np.ndarray, where: str) -> np.ndarray | None:
-    """A factor F with F F^T the correlation, None for independent values."""
-    if not table.correlation_length_m:
-        return None
-    if len(places) > _MOST_CORRELATED:
-        raise InputError(
-            f"fields.{key} {where} correlates {len(places)} values; at most {_MOST_CORRELATED} "
-            "are allowed"
-        )
-    # A Gaussian correlation is singular to rounding: eigenvalues below that are zero.
-    values, vectors = np.linalg.eigh(correlation(table, places))
-    return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
-
-
-def _values(key: str, table: FieldTable, normal: np.ndarray, where: str) -> np.ndarray:
-    from scipy.special import ndtr, ndtri
-
-    if isinstance(table, ChanceField):
-        return np.asarray(normal < ndtri(table.probability), float)
-    if table.type == "normal":  # at once: through probabilities digits are lost
-        return np.asarray((table.mean or 0.0) + table.standard_deviation * normal)
-    try:
-        return np.asarray(inverse(table, 0.0)(ndtr(normal)))
-    except ValueError as error:
-        raise InputError(f"fields.{key} {where} {error}") from error
-
-
-def _dropper_lengths(scene: Scene, line: Line, table: FieldTable) -> Carrier:
-    which = line.numbered_droppers
-    own = np.zeros(len(which))
-    given = scene.irregularities.dropper_lengths
-    number = {place: i for i, place in enumerate(which)}
-    for span, dropper, error in (given.by_dropper if given is not None else None) or ():
-        own[number[int(span), int(dropper)]] += error
-    template = ", ".join(f"[{span}, {dropper}, %.4f]" for span, dropper in which)
-    return Carrier(np.array([*which.values()]), own, _filled(f"[{template}]"))
-
-
-def _heights(name: str, usual: str) -> Callable[[Scene, Line, FieldTable], Carrier]:
-    """Carrier of heights [m] by place, at supports or droppers."""
-
-    def carrier(scene: Scene, line: Line, table: FieldTable) -> Carrier:
-        given = getattr(scene.irregularities, name)
-        if given is not None and given.by_place is not None:
-            raise InputError(
-                f"irregularities.{name}.by_place {scene.origin.of(f'irregularities.{name}')} "
-                "cannot stand beside a field of the same key; take one of them away"
-            )
-        at_supports = (table.at or usual) == "supports"
-        places = line.support_positions if at_supports else np.unique(line.dropper_x)
-        template = ", ".join(f"[{x:.6f}, %.7f]" for x in places)
-        return Carrier(places, np.zeros(len(places)), _filled(f"[{template}]"))
-
-    return carrier
-
-
-def _staggers(name: str) -> Callable[[Scene, Line, FieldTable], Carrier]:
-    """Carrier of sideways offsets at the supports [m]."""
-
-    def carrier(scene: Scene, line: Line, table: FieldTable) -> Carrier:
-        own = np.array(staggered(getattr(scene.line, name) or [0.0], scene.line.n_spans))
-        return Carrier(line.support_positions, own, _filled(_list_of(len(own))))
-
-    return carrier
-
-
-def _spans(scene: Scene, line: Line, table: FieldTable) -> Carrier:
-    if scene.line.transition.span_m is not None:
-        raise InputError(
-            "fields.line.span_m needs one list of all spans; take line.transition.span_m away"
-        )
-    own, masts = np.array(span_lengths(scene.line)), line.support_positions
-    return Carrier(0.5 * (masts[1:] + masts[:-1]), own, _filled(_list_of(len(own))))
-
-
-def _defects(scene: Scene, line: Line, table: FieldTable) -> Carrier:
-    assert isinstance(table, ChanceField)
-    which, kind = line.numbered_droppers, table.defect
-    own = [text_of(one.model_dump(exclude_none=True)) for one in scene.defects]
-    spared = {
-        (getattr(one, "span", 0), getattr(one, "dropper", 0)) for one in scene.defects
-    }  # a dropper has one defect
-
-    entries = [
-        "" if one in spared else text_of({"type": kind, "span": one[0], "dropper": one[1]})
-        for one in which
-    ]
-
-    def text(values: np.ndarray) -> str:
-        found = (entries[i] for i in np.flatnonzero(values))
-        return f"[{', '.join([*own, *filter(None, found)])}]"
-
-    return Carrier(np.array([*which.values()]), np.zeros(len(which)), text)
-
-
-def _filled(template: str) -> Callable[[np.ndarray], str]:
-    """Values put into a text with a place for each."""
-    return lambda values: template % tuple(values.tolist())
-
-
-def _list_of(n: int) -> str:
-    return f"[{', '.join(['%.7f'] * n)}]"
-
-
-_CARRIERS: dict[str, Callable[[Scene, Line, FieldTable], Carrier]] = {
-    "irregularities.dropper_lengths.by_dropper": _dropper_lengths,
-    "irregularities.contact_wire_height.by_place": _heights("contact_wire_height", "supports"),
-    "irregularities.running_surface.by_place": _heights("running_surface", "droppers"),
-    "line.stagger_m": _staggers("stagger_m"),
-    "line.messenger_stagger_m": _staggers("messenger_stagger_m"),
-    "line.span_m": _spans,
-    "defects": _defects,
-}
-
-
-def sample_name(number: int) -> str:
-    """The variant of a sample, by its number from 1: the same, however many samples there are."""
-    return f"sample_{number:06d}"
 
 
 def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
@@ -373,7 +65,7 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
         If a key has no value of its own that stands for a missing mean, or takes no field, or if a
         key sets another one again or changes nothing.
     """
-    cube = points(sampling)
+    cube = _points(sampling)
     where = f"in {file}"
     own = resolved(scene)
     _refuse_lost(sampling, own, where)
@@ -405,7 +97,7 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
     ):
         numbers = seeds(column)
         varied = (*sampling.keys, *(other for other in sampling.fields if other != key))
-        texts = fields_as_text(key, field, scene, varied, sampling.seed, numbers, where)
+        texts = _fields_as_text(key, field, scene, varied, sampling.seed, numbers, where)
         columns[field_column(key)] = [str(number) for number in numbers]
         assigned.append([f"{key}={text}" for text in texts])
     names = list(columns)
@@ -417,6 +109,11 @@ def samples(sampling: SamplingTable, scene: Scene, file: str) -> list[Variant]:
             zip(zip(*assigned, strict=True), zip(*columns.values(), strict=True), strict=True), 1
         )
     ]
+
+
+def sample_name(number: int) -> str:
+    """The variant of a sample, by its number from 1: the same, however many samples there are."""
+    return f"sample_{number:06d}"
 
 
 def _refuse_lost(sampling: SamplingTable, own: dict[str, Any], where: str) -> None:
@@ -480,3 +177,276 @@ def _own_number(key: str, own: dict[str, Any]) -> float:
     if not is_number(here):
         raise ValueError("needs a mean: the scene has no number of its own there")
     return float(here)
+
+
+def _points(sampling: SamplingTable) -> np.ndarray:
+    """Points of the open unit cube, one a sample, (n_samples, n_columns), uniform and with the
+    wanted correlation.
+
+    Sobol points are scrambled (Owen 1998); with them, and with random ones, a larger ``n`` begins
+    with the same points. Samples of ``saltelli`` stand in the order of SALib: a base sample, those
+    in which one coordinate is another's, the other base sample.
+    """
+    from scipy.stats import qmc
+
+    n, d, seed = sampling.n, len(sampling.columns), sampling.seed
+    if sampling.method == SALTELLI:
+        from SALib.sample import sobol
+
+        found = sobol.sample(
+            salib_problem(sampling.columns), n, calc_second_order=sampling.second_order, seed=seed
+        )
+    elif sampling.method == "sobol":
+        # A power of 2 keeps the balance of the sequence, and its first points are the same.
+        found = qmc.Sobol(d, seed=seed).random_base2(math.ceil(math.log2(n)))[:n]
+    elif sampling.method == "latin_hypercube":
+        found = qmc.LatinHypercube(d, seed=seed).random(n)
+    else:
+        found = np.random.default_rng(seed).random((n, d))
+    found = np.clip(found, _EDGE, 1.0 - _EDGE)
+    return _correlated(found, sampling) if sampling.correlations else found
+
+
+def salib_problem(columns: Sequence[str]) -> dict[str, object]:
+    """Inputs as SALib takes them, uniform in the unit cube."""
+    bounds = [[0.0, 1.0] for _ in columns]
+    return {"num_vars": len(columns), "names": list(columns), "bounds": bounds}
+
+
+def _correlated(uniform: np.ndarray, sampling: SamplingTable) -> np.ndarray:
+    """Coordinates under a Gaussian copula.
+
+    Normal quantities with the correlation r have the rank correlation rho = 6/pi asin(r/2)
+    (Kruskal 1958, J. Am. Stat. Assoc. 53, eq. 6.3), so that r = 2 sin(pi rho/6).
+    """
+    from scipy.special import ndtr, ndtri
+
+    matrix = np.eye(uniform.shape[1])
+    columns = sampling.columns
+    for one in sampling.correlations:
+        i, j = (columns.index(key) for key in one.keys)
+        matrix[i, j] = matrix[j, i] = 2.0 * math.sin(math.pi * one.rank / 6.0)
+    try:
+        factor = np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "the correlations of the sampling contradict each other: no quantities have all of "
+            "them (their matrix is not positive definite)"
+        ) from error
+    return np.clip(ndtr(ndtri(uniform) @ factor.T), _EDGE, 1.0 - _EDGE)
+
+
+def _normal_rows(seed: int, name: str, realisations: Sequence[int], n: int) -> np.ndarray:
+    """Independent standard normal numbers, a row of ``n`` for each realisation.
+
+    A row depends on the sampling's seed, the field's name and the number of the realisation only,
+    so that the same one always comes again.
+    """
+    # A counter-based generator (Salmon et al. 2011) is set to a key in no time.
+    philox = np.random.Philox(key=0)
+    generator, state = np.random.Generator(philox), philox.state
+    mark = zlib.crc32(name.encode())
+    rows = np.empty((len(realisations), n))
+    for row, number in zip(rows, realisations, strict=True):
+        state["state"]["key"][:] = (seed << 32 | mark, number)
+        philox.state = state
+        generator.standard_normal(out=row)
+    return rows
+
+
+# Keys that place droppers, supports and spans.
+_GEOMETRY = (
+    "line.n_spans",
+    "line.span_m",
+    "line.spans_file",
+    "line.topology",
+    "line.transition",
+    "line.overlap",
+    "line.links",
+    "line.dropper.positions_m",
+    "line.dropper.count",
+    "line.dropper.spacing_m",
+    "line.dropper.patterns",
+    "line.dropper.patterns_file",
+)
+
+
+class Carrier(NamedTuple):
+    """Form in which a key of the scene takes a field.
+
+    Attributes
+    ----------
+    places : shape (n,), where the values stand along the line [m]
+    own : shape (n,), the scene's own values, to which the field is added, in the key's unit
+    text : from values of shape (n,) to the key's value as text
+    """
+
+    places: np.ndarray
+    own: np.ndarray
+    text: Callable[[np.ndarray], str]
+
+
+def _fields_as_text(
+    key: str,
+    table: FieldTable,
+    scene: Scene,
+    varied: Sequence[str],
+    seed: int,
+    realisations: Sequence[int],
+    where: str,
+) -> list[str]:
+    """The values of a key that takes a field, one for each realisation, as texts of TOML. Keys that
+    are ``varied`` too must not move its places; ``where`` says where the field's table stands."""
+    make = _CARRIERS.get(key)
+    if make is None:
+        raise InputError(f"fields.{key} {where} takes no field; there are {', '.join(_CARRIERS)}")
+    moving = [one for one in varied if any(f"{one}.".startswith(f"{g}.") for g in _GEOMETRY)]
+    if moving:
+        raise InputError(
+            f"fields.{key} {where} cannot stand beside {moving[0]}, which moves the places of its "
+            "values; vary one of the two"
+        )
+    if (key == "defects") != isinstance(table, ChanceField):
+        raise InputError(f'fields.{key} {where} cannot be of type {table.type}; "chance" is for '
+                         "defects, and for them alone")  # fmt: skip
+    if table.at is not None and not key.endswith(".by_place"):
+        raise InputError(f"fields.{key}.at {where} is for courses along the line (by_place) only")
+    carrier = make(scene, line_of(scene), table)
+    n = len(carrier.places)
+    if n == 0:
+        raise InputError(f"fields.{key} {where} has no places: the line has no droppers")
+    if n * len(realisations) > _MOST_NUMBERS:
+        raise InputError(
+            f"fields.{key} {where} needs {len(realisations)} samples of {n} values; at most "
+            f"{_MOST_NUMBERS} values are allowed"
+        )
+    factor = _factor(key, table, carrier.places, where)
+    texts: list[str] = []
+    for begin in range(0, len(realisations), _BATCH):
+        normal = _normal_rows(seed, key, realisations[begin : begin + _BATCH], n)
+        if factor is not None:
+            normal = normal @ factor.T
+        texts += map(carrier.text, carrier.own + _values(key, table, normal, where))
+    return texts
+
+
+def _correlation(table: FieldTable, places: np.ndarray) -> np.ndarray:
+    """Correlation (n, n) of the normal quantities behind a field at ``places`` (n,) [m], of a table
+    with a correlation length above 0."""
+    distance = np.abs(places[:, None] - places) / table.correlation_length_m
+    return np.asarray(np.exp(-distance if table.correlation == "exponential" else -(distance**2)))
+
+
+def _factor(key: str, table: FieldTable, places: np.ndarray, where: str) -> np.ndarray | None:
+    """A factor F with F F^T the correlation, None for independent values."""
+    if not table.correlation_length_m:
+        return None
+    if len(places) > _MOST_CORRELATED:
+        raise InputError(
+            f"fields.{key} {where} correlates {len(places)} values; at most {_MOST_CORRELATED} "
+            "are allowed"
+        )
+    # A Gaussian correlation is singular to rounding: eigenvalues below that are zero.
+    values, vectors = np.linalg.eigh(_correlation(table, places))
+    return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
+
+
+def _values(key: str, table: FieldTable, normal: np.ndarray, where: str) -> np.ndarray:
+    from scipy.special import ndtr, ndtri
+
+    if isinstance(table, ChanceField):
+        return np.asarray(normal < ndtri(table.probability), float)
+    if table.type == "normal":  # at once: through probabilities digits are lost
+        return np.asarray((table.mean or 0.0) + table.standard_deviation * normal)
+    try:
+        return np.asarray(inverse(table, 0.0)(ndtr(normal)))
+    except ValueError as error:
+        raise InputError(f"fields.{key} {where} {error}") from error
+
+
+def _dropper_lengths(scene: Scene, line: Line, table: FieldTable) -> Carrier:
+    which = line.numbered_droppers
+    own = np.zeros(len(which))
+    given = scene.irregularities.dropper_lengths
+    number = {place: i for i, place in enumerate(which)}
+    for span, dropper, error in (given.by_dropper if given is not None else None) or ():
+        own[number[int(span), int(dropper)]] += error
+    template = ", ".join(f"[{span}, {dropper}, %.4f]" for span, dropper in which)
+    return Carrier(np.array([*which.values()]), own, _filled(f"[{template}]"))
+
+
+def _heights(name: str, usual: str) -> Callable[[Scene, Line, FieldTable], Carrier]:
+    """Carrier of heights [m] by place, at supports or droppers."""
+
+    def carrier(scene: Scene, line: Line, table: FieldTable) -> Carrier:
+        given = getattr(scene.irregularities, name)
+        if given is not None and given.by_place is not None:
+            raise InputError(
+                f"irregularities.{name}.by_place {scene.origin.of(f'irregularities.{name}')} "
+                "cannot stand beside a field of the same key; take one of them away"
+            )
+        at_supports = (table.at or usual) == "supports"
+        places = line.support_positions if at_supports else np.unique(line.dropper_x)
+        template = ", ".join(f"[{x:.6f}, %.7f]" for x in places)
+        return Carrier(places, np.zeros(len(places)), _filled(f"[{template}]"))
+
+    return carrier
+
+
+def _staggers(name: str) -> Callable[[Scene, Line, FieldTable], Carrier]:
+    """Carrier of sideways offsets at the supports [m]."""
+
+    def carrier(scene: Scene, line: Line, table: FieldTable) -> Carrier:
+        own = np.array(staggered(getattr(scene.line, name) or [0.0], scene.line.n_spans))
+        return Carrier(line.support_positions, own, _filled(_list_template(len(own))))
+
+    return carrier
+
+
+def _spans(scene: Scene, line: Line, table: FieldTable) -> Carrier:
+    if scene.line.transition.span_m is not None:
+        raise InputError(
+            "fields.line.span_m needs one list of all spans; take line.transition.span_m away"
+        )
+    own, masts = np.array(span_lengths(scene.line)), line.support_positions
+    return Carrier(0.5 * (masts[1:] + masts[:-1]), own, _filled(_list_template(len(own))))
+
+
+def _defects(scene: Scene, line: Line, table: FieldTable) -> Carrier:
+    assert isinstance(table, ChanceField)
+    which, kind = line.numbered_droppers, table.defect
+    own = [text_of(one.model_dump(exclude_none=True)) for one in scene.defects]
+    spared = {
+        (getattr(one, "span", 0), getattr(one, "dropper", 0)) for one in scene.defects
+    }  # a dropper has one defect
+
+    entries = [
+        "" if one in spared else text_of({"type": kind, "span": one[0], "dropper": one[1]})
+        for one in which
+    ]
+
+    def text(values: np.ndarray) -> str:
+        found = (entries[i] for i in np.flatnonzero(values))
+        return f"[{', '.join([*own, *filter(None, found)])}]"
+
+    return Carrier(np.array([*which.values()]), np.zeros(len(which)), text)
+
+
+def _filled(template: str) -> Callable[[np.ndarray], str]:
+    """Values put into a text with a place for each."""
+    return lambda values: template % tuple(values.tolist())
+
+
+def _list_template(n: int) -> str:
+    return f"[{', '.join(['%.7f'] * n)}]"
+
+
+_CARRIERS: dict[str, Callable[[Scene, Line, FieldTable], Carrier]] = {
+    "irregularities.dropper_lengths.by_dropper": _dropper_lengths,
+    "irregularities.contact_wire_height.by_place": _heights("contact_wire_height", "supports"),
+    "irregularities.running_surface.by_place": _heights("running_surface", "droppers"),
+    "line.stagger_m": _staggers("stagger_m"),
+    "line.messenger_stagger_m": _staggers("messenger_stagger_m"),
+    "line.span_m": _spans,
+    "defects": _defects,
+}

@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from catenary.base.errors import InputError
@@ -20,15 +21,15 @@ from catenary.cases.scene.keys.table import Table
 from catenary.cases.studies.sweep.variants import check_key
 from catenary.cases.studies.task_files import checked_table
 
-if TYPE_CHECKING:
-    import numpy as np
-
 _Number = Annotated[float, Field(ge=-1e15, le=1e15)]
 _Positive = Annotated[float, Field(gt=0, le=1e15)]
 # Seeds of a scene are smaller; so are the numbers of realisations.
 N_SEEDS = 2**31 - 1
 _FARTHEST = 8.0  # standard deviations, beyond which is less than 1e-15 of a normal quantity
 _WIDEST = 100.0  # standard deviations of lognormal quantities over their means
+MOST_SAMPLES = 100_000
+_Key = Annotated[str, Field(min_length=1, max_length=200)]
+SALTELLI = "saltelli"
 
 
 class NormalTable(Table):
@@ -129,96 +130,6 @@ DistributionTable = ContinuousTable | ChoicesTable | SeedTable
 def _check_bounds(least: float, most: float) -> None:
     if most <= least:
         raise ValueError(f"must have most greater than least, but they are {most:g} and {least:g}")
-
-
-def takes_mean(table: DistributionTable) -> bool:
-    """Whether the mean of a distribution is left to the scene."""
-    known = NormalTable | LognormalTable | TruncatedNormalTable
-    return isinstance(table, known) and table.mean is None
-
-
-def inverse(
-    table: ContinuousTable, mean: float | None = None
-) -> Callable[[np.ndarray], np.ndarray]:
-    """The inverse distribution function: from probabilities in (0, 1) to values of the key.
-
-    Parameters
-    ----------
-    table : the distribution
-    mean : stands for a mean that the table leaves out
-
-    Raises
-    ------
-    ValueError
-        With a predicate, if a lognormal quantity has no positive mean or is too wide, or if bounds
-        are too far from the mean; of the function, if its values are not finite.
-    """
-    from scipy import stats
-
-    if isinstance(table, UniformTable):
-        frozen = stats.uniform(table.least, table.most - table.least)
-        return _function(frozen)
-    centre = mean if table.mean is None else table.mean
-    assert centre is not None
-    deviation = table.standard_deviation
-    if isinstance(table, NormalTable):
-        return _function(stats.norm(centre, deviation))
-    if isinstance(table, LognormalTable):
-        if centre <= 0:
-            raise ValueError(f"must have a mean above 0, but it is {centre:g}")
-        if deviation > _WIDEST * centre:
-            raise ValueError(
-                f"must have a standard_deviation of at most {_WIDEST:g} times the mean, but they "
-                f"are {deviation:g} and {centre:g}"
-            )
-        # Mean m and standard deviation s of the quantity: sigma^2 = ln(1 + s^2/m^2) and
-        # mu = ln m - sigma^2/2 of its logarithm (Johnson, Kotz, Balakrishnan, vol. 1, ch. 14).
-        variance = math.log1p((deviation / centre) ** 2)
-        median = math.exp(math.log(centre) - variance / 2)
-        return _function(stats.lognorm(math.sqrt(variance), scale=median))
-    low = -math.inf if table.least is None else (table.least - centre) / deviation
-    high = math.inf if table.most is None else (table.most - centre) / deviation
-    if low > _FARTHEST or high < -_FARTHEST:
-        raise ValueError(
-            f"must have bounds within {_FARTHEST:g} standard deviations of the mean {centre:g}"
-        )
-    return _function(stats.truncnorm(low, high, centre, deviation))
-
-
-def _function(frozen: Any) -> Callable[[np.ndarray], np.ndarray]:
-    """The inverse function of SciPy's distribution; ValueError where its numbers are not finite."""
-    import numpy as np
-
-    def values(probabilities: np.ndarray) -> np.ndarray:
-        with np.errstate(all="ignore"):
-            found = np.asarray(frozen.ppf(probabilities))
-        if not np.isfinite(found).all():
-            raise ValueError("gives numbers that are not finite")
-        return found
-
-    return values
-
-
-def chosen(table: ChoicesTable, probabilities: np.ndarray) -> list[int]:
-    """Number of the value, from 0, for each of ``probabilities`` in (0, 1), by the weights of the
-    values of a ``table``."""
-    import numpy as np
-
-    weights = np.ones(len(table.values)) if table.weights is None else np.array(table.weights)
-    ends = np.cumsum(weights) / weights.sum()
-    last = int(np.flatnonzero(weights)[-1])  # where rounding leaves the sum below 1
-    numbers = np.searchsorted(ends, probabilities, side="right")
-    return [int(number) for number in np.minimum(numbers, last)]
-
-
-def seeds(probabilities: np.ndarray) -> list[int]:
-    """A whole number below ``N_SEEDS`` for each probability in (0, 1)."""
-    return [int(number) for number in probabilities * N_SEEDS]
-
-
-MOST_SAMPLES = 100_000
-_Key = Annotated[str, Field(min_length=1, max_length=200)]
-SALTELLI = "saltelli"
 
 
 class _AlongLine(Table):
@@ -420,3 +331,86 @@ def _by_dotted_keys(value: Any) -> Any:
         else:
             found[name] = inner
     return found
+
+
+def takes_mean(table: DistributionTable) -> bool:
+    """Whether the mean of a distribution is left to the scene."""
+    known = NormalTable | LognormalTable | TruncatedNormalTable
+    return isinstance(table, known) and table.mean is None
+
+
+def inverse(
+    table: ContinuousTable, mean: float | None = None
+) -> Callable[[np.ndarray], np.ndarray]:
+    """The inverse distribution function: from probabilities in (0, 1) to values of the key.
+
+    Parameters
+    ----------
+    table : the distribution
+    mean : stands for a mean that the table leaves out
+
+    Raises
+    ------
+    ValueError
+        With a predicate, if a lognormal quantity has no positive mean or is too wide, or if bounds
+        are too far from the mean; of the function, if its values are not finite.
+    """
+    from scipy import stats
+
+    if isinstance(table, UniformTable):
+        frozen = stats.uniform(table.least, table.most - table.least)
+        return _function(frozen)
+    centre = mean if table.mean is None else table.mean
+    assert centre is not None
+    deviation = table.standard_deviation
+    if isinstance(table, NormalTable):
+        return _function(stats.norm(centre, deviation))
+    if isinstance(table, LognormalTable):
+        if centre <= 0:
+            raise ValueError(f"must have a mean above 0, but it is {centre:g}")
+        if deviation > _WIDEST * centre:
+            raise ValueError(
+                f"must have a standard_deviation of at most {_WIDEST:g} times the mean, but they "
+                f"are {deviation:g} and {centre:g}"
+            )
+        # Mean m and standard deviation s of the quantity: sigma^2 = ln(1 + s^2/m^2) and
+        # mu = ln m - sigma^2/2 of its logarithm (Johnson, Kotz, Balakrishnan, vol. 1, ch. 14).
+        variance = math.log1p((deviation / centre) ** 2)
+        median = math.exp(math.log(centre) - variance / 2)
+        return _function(stats.lognorm(math.sqrt(variance), scale=median))
+    low = -math.inf if table.least is None else (table.least - centre) / deviation
+    high = math.inf if table.most is None else (table.most - centre) / deviation
+    if low > _FARTHEST or high < -_FARTHEST:
+        raise ValueError(
+            f"must have bounds within {_FARTHEST:g} standard deviations of the mean {centre:g}"
+        )
+    return _function(stats.truncnorm(low, high, centre, deviation))
+
+
+def _function(frozen: Any) -> Callable[[np.ndarray], np.ndarray]:
+    """The inverse function of SciPy's distribution; ValueError where its numbers are not finite."""
+
+    def values(probabilities: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            found = np.asarray(frozen.ppf(probabilities))
+        if not np.isfinite(found).all():
+            raise ValueError("gives numbers that are not finite")
+        return found
+
+    return values
+
+
+def chosen(table: ChoicesTable, probabilities: np.ndarray) -> list[int]:
+    """Number of the value, from 0, for each of ``probabilities`` in (0, 1), by the weights of the
+    values of a ``table``."""
+
+    weights = np.ones(len(table.values)) if table.weights is None else np.array(table.weights)
+    ends = np.cumsum(weights) / weights.sum()
+    last = int(np.flatnonzero(weights)[-1])  # where rounding leaves the sum below 1
+    numbers = np.searchsorted(ends, probabilities, side="right")
+    return [int(number) for number in np.minimum(numbers, last)]
+
+
+def seeds(probabilities: np.ndarray) -> list[int]:
+    """A whole number below ``N_SEEDS`` for each probability in (0, 1)."""
+    return [int(number) for number in probabilities * N_SEEDS]

@@ -36,6 +36,20 @@ from catenary.solver.tangents.set_up import (
 
 # Memory for derivatives of all steps; for further parameters the march is made again [B].
 _BYTES = 2**28
+_MM = 1e3  # in a metre
+# Half of the last digit of the last column, which has one more than others.
+_SEEN = 0.5e-4
+_BY_PERCENT = "std_change_by_percent_N"
+_FORCES = {
+    "mean_change_N": ("mean", "mean [N]"),
+    "std_change_N": ("std", "sigma [N]"),
+    "stat_max_change_N": ("stat_max", ""),
+    "stat_min_change_N": ("stat_min", "stat. min [N]"),
+    "max_change_N": ("maximum", ""),
+    "min_change_N": ("minimum", "least [N]"),
+}
+# Half of the last digit of a height's change [mm]: a smaller one is round-off, which has no place.
+_SEEN_HEIGHT_MM = 0.5e-3
 
 
 @dataclass
@@ -120,7 +134,7 @@ def sensitivity_of(
             marched = march_with_tangents(comm, at_rest, changes[part])
             if found is None:
                 found = _without_parameters(marched, at_rest)
-            _add(found, marched, at_rest, kept[part])
+            _add_derivatives(found, marched, at_rest, kept[part])
             bar.ended(len(kept[part]))
     assert found is not None
     found.left_out = left_out
@@ -204,7 +218,7 @@ def _within(marched: Tangents, at_rest: LineAtRest) -> Iterator[tuple[int, np.nd
         yield number, (position >= first) & (position <= last)
 
 
-def _add(
+def _add_derivatives(
     found: Sensitivity, marched: Tangents, at_rest: LineAtRest, parameters: list[Parameter]
 ) -> None:
     """Add the derivatives of a march by some parameters."""
@@ -226,20 +240,6 @@ def _add(
             [ForceDerivatives(*(values[place] for values in own)) for own in of_all]
         )
         found.by_uplift.append(float(by_uplift[place]))
-
-
-_MM = 1e3
-# Half of the last digit of the last column, which has one more than others.
-_SEEN = 0.5e-4
-_BY_PERCENT = "std_change_by_percent_N"
-_FORCES = {
-    "mean_change_N": ("mean", "mean [N]"),
-    "std_change_N": ("std", "sigma [N]"),
-    "stat_max_change_N": ("stat_max", ""),
-    "stat_min_change_N": ("stat_min", "stat. min [N]"),
-    "max_change_N": ("maximum", ""),
-    "min_change_N": ("minimum", "least [N]"),
-}
 
 
 def table_of(found: Sensitivity) -> StudyTable:
@@ -349,11 +349,6 @@ def _early(found: Sensitivity) -> list[str]:
     return sentences
 
 
-_MM_IN_M = 1e3
-# Half of the last digit of a height's change [mm]: a smaller one is round-off, which has no place.
-_SEEN_HEIGHT_MM = 0.5e-3
-
-
 @dataclass(frozen=True)
 class RestSensitivity:
     """Shape and elasticity of the span in the middle of a line, differentiated by m parameters.
@@ -409,13 +404,13 @@ def rest_sensitivity_of(
     scenes = ChangedScenes(scene)
     named = bool(keys) or droppers
     at_rest = sound_rest(scene)
-    now = _numbers(at_rest)
+    now = _rest_numbers(at_rest)
     parameters, found, left_out = [], [], {}
     for parameter in parameters_of(scenes, keys, droppers):
         if parameter.is_of_train and not named:
             continue
         try:
-            own = _derivative(parameter, scenes, at_rest)
+            own = _rest_derivative(parameter, scenes, at_rest)
         except InputError as error:
             if named:
                 raise
@@ -437,7 +432,7 @@ def rest_sensitivity_of(
     )
 
 
-def _numbers(at_rest: LineAtRest) -> np.ndarray:
+def _rest_numbers(at_rest: LineAtRest) -> np.ndarray:
     """Heights of the contact wires and elasticity at the places of the latter, (n, w + 1)."""
     mesh, x = at_rest.mesh, at_rest.lift.x
     columns = [
@@ -447,8 +442,10 @@ def _numbers(at_rest: LineAtRest) -> np.ndarray:
     return np.stack([*columns, at_rest.lift.lift], axis=1)
 
 
-def _derivative(parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest) -> np.ndarray:
-    """Derivatives of ``_numbers`` per unit of a parameter."""
+def _rest_derivative(
+    parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest
+) -> np.ndarray:
+    """Derivatives of ``_rest_numbers`` per unit of a parameter."""
     if parameter.is_of_train:
         raise InputError(f"{parameter.key} does not change the line at rest")
     taut = at_rest.form.dropper_force > 0.0
@@ -465,7 +462,7 @@ def _derivative(parameter: Parameter, scenes: ChangedScenes, at_rest: LineAtRest
                 f"{parameter.key} makes a dropper slack or taut at rest, where the line has no "
                 "derivative; take it away"
             )
-        return _numbers(rest)
+        return _rest_numbers(rest)
 
     step = parameter.step
     return derivative(numbers(-step), numbers(step), step)
@@ -486,11 +483,9 @@ def along_span(found: RestSensitivity) -> StudyTable:
             "wire": wire,
             "x_m": float(found.x[i]),
             "height_m": float(found.height[i, j]),
-            "height_change_mm": _MM_IN_M * parameter.change * float(found.by_height[m, i, j]),
-            "elasticity_mm_per_N": _MM_IN_M * float(found.elasticity[i]),
-            "elasticity_change_mm_per_N": _MM_IN_M
-            * parameter.change
-            * float(found.by_elasticity[m, i]),
+            "height_change_mm": _MM * parameter.change * float(found.by_height[m, i, j]),
+            "elasticity_mm_per_N": _MM * float(found.elasticity[i]),
+            "elasticity_change_mm_per_N": _MM * parameter.change * float(found.by_elasticity[m, i]),
         }
         for m, parameter in enumerate(found.parameters)
         for j, wire in enumerate(found.wires)
@@ -499,7 +494,7 @@ def along_span(found: RestSensitivity) -> StudyTable:
     return StudyTable(columns, rows)
 
 
-def summary(found: RestSensitivity) -> StudyTable:
+def _rest_table(found: RestSensitivity) -> StudyTable:
     """A row for each parameter: what it changes most in the span; the largest change first."""
     columns = [
         Column("parameter", "parameter"),
@@ -516,7 +511,7 @@ def summary(found: RestSensitivity) -> StudyTable:
         moved = np.nan_to_num(found.by_height[m])
         place, wire = np.unravel_index(np.abs(moved).argmax(), moved.shape)
         change = parameter.change
-        height = _MM_IN_M * change * float(moved[place, wire])
+        height = _MM * change * float(moved[place, wire])
         rows.append(
             {
                 "parameter": parameter.key,
@@ -540,7 +535,7 @@ def rest_text(found: RestSensitivity) -> str:
         elasticity_text(found.x, found.elasticity),
         "",
         "Changes under a change of each parameter; of the height the largest:",
-        summary(found).text(),
+        _rest_table(found).text(),
     ]
     lines += [f"{key} is left out: {why}" for key, why in found.left_out.items()]
     return "\n".join(lines)

@@ -52,6 +52,17 @@ N_VECTORS = 40
 STABLE = 1.0 + 1e-6
 # A head meets wires together whose heights differ by no more [m], some times the depth of a march.
 _AS_HIGH = 5e-3
+# Depth at the start [m]: exchanges settle to a share of it that is more than the round-off of
+# heights of 5 m, 1e-15 m.
+DEPTH = 1e-3
+# Slow enough to stand: within a run the train moves less than a millimetre [m/s].
+_SPEED = 1e-4
+# A perturbation grows if the force passes this many times the first one within so many steps.
+GROWN, STEPS = 1e3, 400
+# Exchanges must agree to this share of the start within so many; one after the other, few steps
+# tell as much as many.
+AGREED, EXCHANGES, EXCHANGED_STEPS = 1e-9, 1000, 20
+COUPLINGS = ("implicit", "explicit", "iterated", "fixed_point")
 
 
 @dataclass(frozen=True)
@@ -323,19 +334,6 @@ def closed_form(line: PointModel, head_mass: float, stiffness: float) -> float:
     springs and dampers within the step do not count, A = M.
     """
     return float(2.0 / np.sqrt(stiffness * _largest(line.load.T @ line.load + 1.0 / head_mass)))
-
-
-# Depth at the start [m]: exchanges settle to a share of it that is more than the round-off of
-# heights of 5 m, 1e-15 m.
-DEPTH = 1e-3
-# Slow enough to stand: within a run the train moves less than a millimetre [m/s].
-_SPEED = 1e-4
-# A perturbation grows if the force passes this many times the first one within so many steps.
-GROWN, STEPS = 1e3, 400
-# Exchanges must agree to this share of the start within so many; one after the other, few steps
-# tell as much as many.
-AGREED, EXCHANGES, EXCHANGED_STEPS = 1e-9, 1000, 20
-COUPLINGS = ("implicit", "explicit", "iterated", "fixed_point")
 
 
 @dataclass(frozen=True)

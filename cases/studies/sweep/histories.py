@@ -21,7 +21,7 @@ from catenary.cases.result_folder.output_folder import remove_dead_parts
 from catenary.cases.studies.records import KeptRows
 from catenary.cases.studies.sweep.jobs import HISTORIES
 from catenary.cases.studies.sweep.variants import Variant
-from catenary.postproc.files.committed_rows import PATH as FILTERED
+from catenary.postproc.files.committed_rows import FILTERED_FORCE
 from catenary.postproc.files.dimensions import CONVENTIONS
 from catenary.postproc.files.disk import MARGIN, opened, reserve, unwritten
 from catenary.postproc.files.hdf5 import HDF5_ERRORS, open_own
@@ -74,7 +74,7 @@ def _chosen(tables: Mapping[str, np.ndarray], names: Sequence[str]) -> dict[str,
     """Time (n_steps,), position and the histories (n_steps, n_pantographs), in single precision."""
     kept = {}
     for name in names:
-        path = FILTERED if name == "filtered_force" else f"channels/{name}"
+        path = FILTERED_FORCE if name == "filtered_force" else f"channels/{name}"
         kept[name] = tables[path].astype(np.float32)
     return {_TIME: tables["time"], _POSITION: tables["channels/contact_position"], **kept}
 

@@ -11,7 +11,7 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.base.options import option
 from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.scene.input.case_files import Assigned
-from catenary.cases.scene.input.faults import UnfitScene, shown
+from catenary.cases.scene.input.faults import UnfitScene, shown, shown_word
 from catenary.cases.scene.keys.keys import meant
 from catenary.cases.scene.load import Draft, load_scene, read_draft
 from catenary.cases.scene.scene import Scene
@@ -60,8 +60,7 @@ def check_names(names: Sequence[str], known: Mapping[str, Any], what: str) -> No
     """Raise InputError if one of ``names`` is none of ``known``, ``what`` being one of these."""
     for name in names:
         if name not in known:
-            told = shown(name)[1:-1] or shown(name)
-            raise InputError(f"{told} is no {what}; {meant(name, list(known))}")
+            raise InputError(f"{shown_word(name)} is no {what}; {meant(name, list(known))}")
 
 
 def statistics_of(summary: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -18,7 +18,8 @@ from catenary.cases.scene.input.case_files import REMOVED, parse_assignment
 from catenary.cases.scene.keys.keys import ANY
 from catenary.cases.scene.keys.units import unit_of, without_unit
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, statistics_of
-from catenary.cases.studies.sweep.variants import Variant
+from catenary.cases.studies.sweep.sweep import RECORD
+from catenary.cases.studies.sweep.variants import Variant, is_number
 from catenary.cases.terminal.lists import Key, keys_of_a_scene
 from catenary.cases.terminal.terminal_text import labelled
 from catenary.postproc.evaluate.statistics import HISTOGRAM_BIN
@@ -33,67 +34,8 @@ from catenary.postproc.report.study_table import (
 )
 
 HISTOGRAM_TABLE, HISTOGRAM_PICTURE = "force_histogram.csv", "force_histogram.png"
-_LOW, _HIGH = 0.05, 0.95
-
-
-def force_histograms(ended: Sequence[Ended]) -> pd.DataFrame | None:
-    """Share of time in bins of the filtered contact force [%]; None if no variant has some.
-
-    A row for each variant and pantograph, a column for each bin under its lower edge [N].
-    Pantographs without statistics have none. Left out too are those whose force spans so much,
-    above 10 kN, that their bins are wider than others.
-    """
-    known = {
-        (one.variant.name, own["name"]): own
-        for one in ended
-        for own in one.summary.get("histograms", [])
-        if own["bin_N"] == HISTOGRAM_BIN
-    }
-    if not known:
-        return None
-    starts = [round(own["from_N"] / HISTOGRAM_BIN) for own in known.values()]
-    shares = [own["percent"] for own in known.values()]
-    first = min(starts)
-    last = max(start + len(share) for start, share in zip(starts, shares, strict=True))
-    percent = np.zeros((len(known), last - first))
-    for row, start, share in zip(percent, starts, shares, strict=True):
-        row[start - first :][: len(share)] = share
-    rows = pd.MultiIndex.from_tuples(known, names=("variant", "pantograph"))
-    return pd.DataFrame(percent, rows, HISTOGRAM_BIN * np.arange(first, last))
-
-
-def histogram_files(ended: Sequence[Ended]) -> dict[str, Content]:
-    """Table and picture of the histograms of a sweep, nothing if there are none."""
-    found = force_histograms(ended)
-    if found is None:
-        return {}
-    heads = [*found.index.names, *(f"from_{edge:g}_N" for edge in found.columns)]
-    rows = ([*own, *row] for own, row in zip(found.index, found.to_numpy().tolist(), strict=True))
-    return {
-        HISTOGRAM_TABLE: file_table(heads, rows),
-        HISTOGRAM_PICTURE: lambda: draw_histograms(found),
-    }
-
-
-@figures.own_style()
-def draw_histograms(found: pd.DataFrame) -> Figure:
-    """The mean share of time in each bin, and between which shares 90 % of the variants lie."""
-    figure = figures.new_figure(3.4)
-    axes = figure.subplots()
-    edges = [*found.columns, found.columns[-1] + HISTOGRAM_BIN]
-    for number, (name, own) in enumerate(found.groupby("pantograph", sort=False)):
-        colour = figures.colour(number)
-        low, high = np.quantile(own, (_LOW, _HIGH), axis=0)
-        axes.stairs(high, edges, baseline=low, fill=True, color=colour, alpha=0.25)
-        look = figures.line(number)
-        axes.stairs(own.mean(axis=0), edges, color=colour, linestyle=look, label=name)
-    figures.tidy(axes, "filtered contact force, 0-20 Hz [N]", "share of time [%]")
-    axes.set_title("line: mean of all variants, band: 5 to 95 % of them", loc="left")
-    figures.legend_above(axes)
-    return figure
-
-
-TABLE, RECORD, PICTURE = "sweep.csv", "sweep.json", "sweep.png"
+_LOW, _HIGH = 0.05, 0.95  # quantiles of variants that a picture of histograms shows
+TABLE, PICTURE = "sweep.csv", "sweep.png"
 PARQUET = "sweep.parquet"
 # Columns of what variants differ by and is no key: their names in a file, the train's direction.
 NAMED, DIRECTION = "named", "direction"
@@ -217,9 +159,11 @@ def files_of(
     }
     content = table_files(record, table)
     if plotted is not None and sum(one.done for one in ended) > 1:
-        content[PICTURE] = partial(draw, table.rows, varied_keys(ended), plotted or PLOTTED)
+        content[PICTURE] = partial(
+            draw_statistics, table.rows, varied_keys(ended), plotted or PLOTTED
+        )
     if histogram:
-        content |= histogram_files(ended)
+        content |= _histogram_files(ended)
     return content
 
 
@@ -231,7 +175,9 @@ def table_files(record: Mapping[str, Any], table: StudyTable) -> dict[str, Conte
 
 
 @figures.own_style()
-def draw(table: Sequence[Mapping[str, Any]], keys: Sequence[str], plotted: Sequence[str]) -> Figure:
+def draw_statistics(
+    table: Sequence[Mapping[str, Any]], keys: Sequence[str], plotted: Sequence[str]
+) -> Figure:
     """Statistics over the first varied key with numbers, a curve for each value of the others.
 
     Parameters
@@ -241,7 +187,8 @@ def draw(table: Sequence[Mapping[str, Any]], keys: Sequence[str], plotted: Seque
     plotted : names out of ``STATISTICS``
     """
     done = [row for row in table if row["outcome"] == "done"]
-    key = next((k for k in keys if all(_is_number(row[k]) for row in done)), None)
+    numbers = (k for k in keys if all(is_number(row[k]) and np.isfinite(row[k]) for row in done))
+    key = next(numbers, None)
     axis = key or (keys[0] if keys else "variant")
     others = [k for k in keys if k != axis]
     curves: dict[str, list[Mapping[str, Any]]] = {}
@@ -268,18 +215,13 @@ def draw(table: Sequence[Mapping[str, Any]], keys: Sequence[str], plotted: Seque
     return figure
 
 
-def _is_number(value: Any) -> bool:
-    real = isinstance(value, int | float) and not isinstance(value, bool)
-    return real and bool(np.isfinite(value))
-
-
 def key_in_words(key: str) -> str:
     """Meaning of a dotted key, with its table and unit: ``contact wire: tension [N]``."""
     parts = [part for part in key.split(".") if not part.isdigit()]
     known = _known(key)
     is_short = known is not None and len(known.meaning) <= _LONGEST
-    meaning = known.meaning if known is not None and is_short else _plain(parts[-1])
-    tables = [_plain(part) for part in parts[1 if is_short or len(parts) > 2 else 0 : -1]]
+    meaning = known.meaning if known is not None and is_short else _spaced(parts[-1])
+    tables = [_spaced(part) for part in parts[1 if is_short or len(parts) > 2 else 0 : -1]]
     unit = unit_of(key)
     words = f"{', '.join(tables)}: {meaning}" if tables else meaning
     return f"{words} [{unit}]" if unit else words
@@ -287,7 +229,7 @@ def key_in_words(key: str) -> str:
 
 def value_in_words(key: str, value: Any) -> str:
     """A key's last part with its value and unit: ``speed 250 km/h``."""
-    name = _plain(key.rsplit(".", 1)[-1])
+    name = _spaced(key.rsplit(".", 1)[-1])
     text = str(value).lower() if isinstance(value, bool) else str(value)
     return f"{name} {text} {unit_of(key)}".rstrip()
 
@@ -303,6 +245,63 @@ def _known(key: str) -> Key | None:
     return None
 
 
-def _plain(name: str) -> str:
+def _spaced(name: str) -> str:
     """A name as it is written in code, without its unit and with spaces."""
     return without_unit(name).replace("_", " ")
+
+
+def force_histograms(ended: Sequence[Ended]) -> pd.DataFrame | None:
+    """Share of time in bins of the filtered contact force [%]; None if no variant has some.
+
+    A row for each variant and pantograph, a column for each bin under its lower edge [N].
+    Pantographs without statistics have none. Left out too are those whose force spans so much,
+    above 10 kN, that their bins are wider than others.
+    """
+    known = {
+        (one.variant.name, own["name"]): own
+        for one in ended
+        for own in one.summary.get("histograms", [])
+        if own["bin_N"] == HISTOGRAM_BIN
+    }
+    if not known:
+        return None
+    starts = [round(own["from_N"] / HISTOGRAM_BIN) for own in known.values()]
+    shares = [own["percent"] for own in known.values()]
+    first = min(starts)
+    last = max(start + len(share) for start, share in zip(starts, shares, strict=True))
+    percent = np.zeros((len(known), last - first))
+    for row, start, share in zip(percent, starts, shares, strict=True):
+        row[start - first :][: len(share)] = share
+    rows = pd.MultiIndex.from_tuples(known, names=("variant", "pantograph"))
+    return pd.DataFrame(percent, rows, HISTOGRAM_BIN * np.arange(first, last))
+
+
+def _histogram_files(ended: Sequence[Ended]) -> dict[str, Content]:
+    """Table and picture of the histograms of a sweep, nothing if there are none."""
+    found = force_histograms(ended)
+    if found is None:
+        return {}
+    heads = [*found.index.names, *(f"from_{edge:g}_N" for edge in found.columns)]
+    rows = ([*own, *row] for own, row in zip(found.index, found.to_numpy().tolist(), strict=True))
+    return {
+        HISTOGRAM_TABLE: file_table(heads, rows),
+        HISTOGRAM_PICTURE: lambda: _draw_histograms(found),
+    }
+
+
+@figures.own_style()
+def _draw_histograms(found: pd.DataFrame) -> Figure:
+    """The mean share of time in each bin, and between which shares 90 % of the variants lie."""
+    figure = figures.new_figure(3.4)
+    axes = figure.subplots()
+    edges = [*found.columns, found.columns[-1] + HISTOGRAM_BIN]
+    for number, (name, own) in enumerate(found.groupby("pantograph", sort=False)):
+        colour = figures.colour(number)
+        low, high = np.quantile(own, (_LOW, _HIGH), axis=0)
+        axes.stairs(high, edges, baseline=low, fill=True, color=colour, alpha=0.25)
+        look = figures.line(number)
+        axes.stairs(own.mean(axis=0), edges, color=colour, linestyle=look, label=name)
+    figures.tidy(axes, "filtered contact force, 0-20 Hz [N]", "share of time [%]")
+    axes.set_title("line: mean of all variants, band: 5 to 95 % of them", loc="left")
+    figures.legend_above(axes)
+    return figure

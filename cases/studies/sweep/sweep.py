@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import Part
 
+RECORD = "sweep.json"
 # Tables that no figure of a variant depends on.
 _IDLE = ("case", "output", "test")
 
@@ -137,7 +138,7 @@ def refuse_other_sweep(
     Folders of whole runs are compared with the ``draft`` of each when it is their turn.
     """
     refuse_impossible(out)
-    path = out / "sweep.json"
+    path = out / RECORD
     if force or not is_file(path):
         return
     try:

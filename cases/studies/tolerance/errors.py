@@ -27,6 +27,12 @@ from catenary.cases.studies.scene_sets import BoundTable, SetTable, refuse_contr
 from catenary.cases.studies.sweep.variants import check_key, is_number, refuse_idle, share_a_value
 
 Label = Annotated[str, Field(min_length=1, max_length=100)]
+_LENGTHS = "irregularities.dropper_lengths.by_dropper"
+_HEIGHTS = "irregularities.contact_wire_height.by_place"
+# Errors so many spans before and behind the evaluated stretch no longer move its statistics.
+_SPANS_BESIDE = 2
+# Normal errors have this share of the tolerance as standard deviation.
+_NORMAL = 0.5
 
 
 class ErrorTable(Table):
@@ -157,14 +163,6 @@ class ToleranceTask(Table):
             raise ValueError("must give each of the errors a name of its own")
         refuse_contradictions(self.criteria, "criteria")
         return self
-
-
-_LENGTHS = "irregularities.dropper_lengths.by_dropper"
-_HEIGHTS = "irregularities.contact_wire_height.by_place"
-# Errors so many spans before and behind the evaluated stretch no longer move its statistics.
-_SPANS_BESIDE = 2
-# Normal errors have this share of the tolerance as standard deviation.
-_NORMAL = 0.5
 
 
 @dataclass(frozen=True)

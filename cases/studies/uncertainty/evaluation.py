@@ -15,11 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
-from catenary.cases.studies.sampling.samples import problem_of, sample_name
+from catenary.cases.studies.sampling.samples import salib_problem, sample_name
 from catenary.cases.studies.sampling.tables import SALTELLI, ChoicesTable, SamplingTable, SeedTable
-from catenary.cases.studies.uncertainty.run_table import DONE, RunTable
+from catenary.cases.studies.uncertainty.run_table import RunTable
 from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.files.run_schema import DONE
 
 CONFIDENCE = 0.95
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
@@ -27,6 +29,157 @@ _RESAMPLES = 2000
 # Of fewer values there are too few different resamples, and no kurtosis; of more resamples need n^2
 # numbers.
 _FEWEST, _MOST_RESAMPLED = 10, 1000
+SOBOL = "Sobol indices (Saltelli et al. 2010; Jansen's total-order index)"
+GIVEN_DATA = (
+    "first-order indices from given data (RBD-FAST with the correction of Tissot and Prieur)"
+)
+_SEED = 1  # of resamples
+# Fewer runs leave no harmonics to tell from noise, in half of which bounds are estimated.
+_FEWEST_RUNS, _MANY_RUNS = 100, 500
+_HARMONICS = 4, 10
+# Resamples for bounds, of up to so many runs and of more: those have small bounds, at a greater
+# cost.
+_RESAMPLES_OF_INDICES, _MOST_RUNS = (100, 25), 5000
+# Half width beyond which a bound of an index, a number from 0 to 1, is none.
+_WIDEST = 10.0
+ANY_CRITERION = "any of them"
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Estimates from the runs of a table.
+
+    Attributes
+    ----------
+    n_runs, n_done : runs of the table, and those that came to their end
+    statistics : mean and standard deviation of each statistic with bounds, its extremes
+    quantiles : of each statistic with bounds
+    probabilities : that acceptance criteria fail, with bounds
+    method : of the sensitivity indices
+    sensitivity : rows of ``indices``
+    remarks : remarks on runs, and the number of runs with each, the most frequent first
+    notes : sentences on what is left out
+    is_sampled : whether the inputs are known to be samples, so that shares are probabilities
+    """
+
+    n_runs: int
+    n_done: int
+    statistics: list[Row]
+    quantiles: list[Row]
+    probabilities: list[Row]
+    method: str
+    sensitivity: list[Row]
+    remarks: list[Row]
+    notes: list[str]
+    is_sampled: bool
+
+
+def evaluate(table: RunTable) -> Uncertainty:
+    """Estimates from a table of runs. Not collective.
+
+    Of Saltelli's samples only the two base samples are independent: they alone give quantiles and
+    probabilities.
+    """
+    independent = independent_runs(table)
+    statistics, quantiles = [], []
+    for name in table.statistics:
+        for pantograph, rows in independent.of(name).items():
+            x = rows[name].dropna().to_numpy(float)
+            if len(x) < 2:
+                continue
+            here = {"statistic": name, "pantograph": pantograph, "n": len(x)}
+            ends = {"minimum": float(x.min()), "maximum": float(x.max())}
+            estimated = _named("mean", mean(x)) | _named("standard_deviation", deviation(x)) | ends
+            statistics.append({**here, **estimated})
+            quantiles += [
+                {**here, "probability": p, **_named("value", quantile(x, p))} for p in QUANTILES
+            ]
+    runs = table.runs
+    n_done = int((runs["outcome"] == DONE).sum())
+    method, sensitivity, notes = indices(table)
+    probabilities = failing(independent)
+    if n_done < len(runs):
+        broken = counted(len(runs) - n_done, "run")
+        others = "; estimates are of the others" if statistics else ""
+        others += ", and no probability counts a run that broke as failed" if probabilities else ""
+        notes.insert(0, f"{broken} of {len(runs)} did not end{others}")
+    if not statistics:
+        notes.insert(0, "there are no estimates, which take figures of at least two runs")
+    is_sampled = table.sampling is not None
+    if statistics and not is_sampled:
+        notes.append(
+            "no sampling is known: means, quantiles and shares are those of these runs, and bounds "
+            "hold if their inputs are independent samples"
+        )
+    return Uncertainty(
+        len(runs), n_done, statistics, quantiles, probabilities, method, sensitivity,
+        _remarks(runs), notes, is_sampled,
+    )  # fmt: skip
+
+
+def _remarks(runs: pd.DataFrame) -> list[Row]:
+    if "remarks" not in runs:
+        return []
+    counts = runs["remarks"].explode().dropna().value_counts()
+    return [{"remark": str(text), "n": int(n)} for text, n in counts.items()]
+
+
+def independent_runs(table: RunTable) -> RunTable:
+    """The rows whose inputs are independent samples of their distributions."""
+    sampling = table.sampling
+    if sampling is None or sampling.method != SALTELLI:
+        return table
+    kept = table.frame["variant"].isin(_base_samples(sampling))
+    return table._replace(frame=table.frame[kept])
+
+
+def _base_samples(sampling: SamplingTable) -> set[str]:
+    """Names of the samples of Saltelli's two base matrices: first and last of each block."""
+    block = sampling.block
+    return {sample_name(block * i + place) for i in range(sampling.n) for place in (1, block)}
+
+
+def failing(table: RunTable) -> list[Row]:
+    """Probability that each acceptance criterion fails, and that any does.
+
+    A run counts for a criterion that was judged in it. Without a column ``judged`` every criterion
+    that fails in some run is taken as judged in all runs with a verdict.
+    """
+    done = table.done
+    if "failed" not in done:
+        return []
+    # Rows of a run have all its criteria each, or those of their pantograph.
+    runs_of = done.groupby("variant", sort=False)
+    failed = [_united(own) for _, own in runs_of["failed"]]
+    if "judged" in done:
+        judged = [
+            list(dict.fromkeys([*_united(own), *more]))
+            for (_, own), more in zip(runs_of["judged"], failed, strict=True)
+        ]
+    else:
+        every = list(dict.fromkeys(name for own in failed for name in own))
+        known = runs_of["passed"].count() > 0 if "passed" in done else [True] * len(failed)
+        judged = [every if one else [] for one in known]
+    runs = list(zip(judged, failed, strict=True))
+    rows = []
+    for name in dict.fromkeys(name for own in judged for name in own):
+        hits = [name in lost for own, lost in runs if name in own]
+        rows.append(_probability(name, sum(hits), len(hits)))
+    if rows:
+        hits = [bool(lost) for own, lost in runs if own]
+        rows.append(_probability(ANY_CRITERION, sum(hits), len(hits)))
+    return rows
+
+
+def _united(lists: Iterable[Sequence[str]]) -> list[str]:
+    """The criteria of all rows of a run, each once."""
+    return list(dict.fromkeys(name for own in lists for name in own))
+
+
+def _probability(criterion: str, failed: int, n: int) -> Row:
+    head = {"criterion": criterion, "n": n, "failed": failed}
+    return {**head, **_named("probability", share(failed, n))}
 
 
 class Bounded(NamedTuple):
@@ -39,8 +192,6 @@ class Bounded(NamedTuple):
 
 def student(x: np.ndarray) -> Bounded:
     """Mean with the bounds of Student's distribution."""
-    from scipy import stats
-
     n, value = len(x), float(np.mean(x))
     half = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * float(np.std(x, ddof=1)) / np.sqrt(n)
     return Bounded(value, value - half, value + half)
@@ -64,8 +215,6 @@ def deviation(x: np.ndarray) -> Bounded:
     c^2 (kurtosis - (n - 3)/n)/(n - 1); the kurtosis is that about a trimmed mean (D. Bonett,
     Comput. Stat. Data Anal. 50, 2006, 775). Fewer than ``_FEWEST`` values have no bounds.
     """
-    from scipy import stats
-
     n, value = len(x), float(np.std(x, ddof=1))
     if np.ptp(x) == 0.0:
         return Bounded(0.0, 0.0, 0.0)
@@ -89,8 +238,6 @@ def _bootstrap(x: np.ndarray) -> Bounded:
     values. They are taken at the greater level that mends both (T. Hesterberg, Am. Stat. 69, 2015,
     371, the expanded interval).
     """
-    from scipy import stats
-
     n = len(x)
     wider = np.sqrt(n / (n - 1.0)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)
     level = float(2.0 * stats.norm.cdf(wider) - 1.0)
@@ -102,7 +249,7 @@ def _bootstrap(x: np.ndarray) -> Bounded:
             n_resamples=_RESAMPLES,
             confidence_level=level,
             method="BCa",
-            random_state=np.random.default_rng(1),
+            random_state=np.random.default_rng(_SEED),
         ).confidence_interval
     return Bounded(float(np.mean(x)), float(found.low), float(found.high))
 
@@ -115,8 +262,6 @@ def quantile(x: np.ndarray, probability: float) -> Bounded:
     bound is NaN if there are too few values for it. The ``probability`` of the quantile is in
     (0, 1).
     """
-    from scipy import stats
-
     ordered, n = np.sort(x), len(x)
     rest = 0.5 * (1.0 - CONFIDENCE)
     lower = int(stats.binom.ppf(rest, n, probability))
@@ -130,31 +275,15 @@ def quantile(x: np.ndarray, probability: float) -> Bounded:
 
 def share(hits: int, n: int) -> Bounded:
     """A probability from a number of hits among n, with bounds of Clopper and Pearson (1934)."""
-    from scipy import stats
-
     # The probability of the test, which is not asked for, underflows with thousands of runs.
     with np.errstate(all="ignore"):
         interval = stats.binomtest(hits, n).proportion_ci(CONFIDENCE, method="exact")
     return Bounded(hits / n, float(interval.low), float(interval.high))
 
 
-def named(name: str, one: Bounded) -> dict[str, Any]:
+def _named(name: str, one: Bounded) -> dict[str, Any]:
     """An estimate as three cells of a row."""
     return {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high}
-
-
-SOBOL = "Sobol indices (Saltelli et al. 2010; Jansen's total-order index)"
-GIVEN_DATA = (
-    "first-order indices from given data (RBD-FAST with the correction of Tissot and Prieur)"
-)
-_SEED = 1  # of resamples
-# Fewer runs leave no harmonics to tell from noise, in half of which bounds are estimated.
-_FEWEST_RUNS, _MANY = 100, 500
-_HARMONICS = 4, 10
-# Resamples for bounds, of up to _MOST runs and of more: those have small bounds, at a greater cost.
-_RESAMPLES_OF_INDICES, _MOST = (100, 25), 5000
-# Half width beyond which a bound of an index, a number from 0 to 1, is none.
-_WIDEST = 10.0
 
 
 def indices(table: RunTable) -> tuple[str, list[dict[str, Any]], list[str]]:
@@ -192,7 +321,7 @@ def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any
             with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # resamples without variance
                 found = sobol.analyze(
-                    problem_of(sampling.columns),
+                    salib_problem(sampling.columns),
                     whole.ravel(),
                     calc_second_order=sampling.second_order,
                     conf_level=CONFIDENCE,
@@ -286,154 +415,14 @@ def _rbd_fast(keys: Sequence[str], x: np.ndarray, y: np.ndarray) -> Mapping[str,
         # index, and with it the bounds, are no numbers.
         with np.errstate(divide="ignore", invalid="ignore"):
             found: Mapping[str, Any] = rbd_fast.analyze(
-                problem_of(keys),
+                salib_problem(keys),
                 x,
                 y,
-                M=_HARMONICS[len(y) >= _MANY],
-                num_resamples=_RESAMPLES_OF_INDICES[len(y) > _MOST],
+                M=_HARMONICS[len(y) >= _MANY_RUNS],
+                num_resamples=_RESAMPLES_OF_INDICES[len(y) > _MOST_RUNS],
                 conf_level=CONFIDENCE,
                 seed=_SEED,
             )
     finally:
         np.random.set_state(before)
     return found
-
-
-ANY_CRITERION = "any of them"
-Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Uncertainty:
-    """Estimates from the runs of a table.
-
-    Attributes
-    ----------
-    n_runs, n_done : runs of the table, and those that came to their end
-    statistics : mean and standard deviation of each statistic with bounds, its extremes
-    quantiles : of each statistic with bounds
-    probabilities : that acceptance criteria fail, with bounds
-    method : of the sensitivity indices
-    sensitivity : rows of ``indices``
-    remarks : remarks on runs, and the number of runs with each, the most frequent first
-    notes : sentences on what is left out
-    is_sampled : whether the inputs are known to be samples, so that shares are probabilities
-    """
-
-    n_runs: int
-    n_done: int
-    statistics: list[Row]
-    quantiles: list[Row]
-    probabilities: list[Row]
-    method: str
-    sensitivity: list[Row]
-    remarks: list[Row]
-    notes: list[str]
-    is_sampled: bool
-
-
-def evaluate(table: RunTable) -> Uncertainty:
-    """Estimates from a table of runs. Not collective.
-
-    Of Saltelli's samples only the two base samples are independent: they alone give quantiles and
-    probabilities.
-    """
-    independent = independent_runs(table)
-    statistics, quantiles = [], []
-    for name in table.statistics:
-        for pantograph, rows in independent.of(name).items():
-            x = rows[name].dropna().to_numpy(float)
-            if len(x) < 2:
-                continue
-            here = {"statistic": name, "pantograph": pantograph, "n": len(x)}
-            ends = {"minimum": float(x.min()), "maximum": float(x.max())}
-            estimated = named("mean", mean(x)) | named("standard_deviation", deviation(x)) | ends
-            statistics.append({**here, **estimated})
-            quantiles += [
-                {**here, "probability": p, **named("value", quantile(x, p))} for p in QUANTILES
-            ]
-    runs = table.runs
-    n_done = int((runs["outcome"] == DONE).sum())
-    method, sensitivity, notes = indices(table)
-    probabilities = failing(independent)
-    if n_done < len(runs):
-        broken = counted(len(runs) - n_done, "run")
-        others = "; estimates are of the others" if statistics else ""
-        others += ", and no probability counts a run that broke as failed" if probabilities else ""
-        notes.insert(0, f"{broken} of {len(runs)} did not end{others}")
-    if not statistics:
-        notes.insert(0, "there are no estimates, which take figures of at least two runs")
-    is_sampled = table.sampling is not None
-    if statistics and not is_sampled:
-        notes.append(
-            "no sampling is known: means, quantiles and shares are those of these runs, and bounds "
-            "hold if their inputs are independent samples"
-        )
-    return Uncertainty(
-        len(runs), n_done, statistics, quantiles, probabilities, method, sensitivity,
-        _remarks(runs), notes, is_sampled,
-    )  # fmt: skip
-
-
-def _remarks(runs: pd.DataFrame) -> list[Row]:
-    if "remarks" not in runs:
-        return []
-    counts = runs["remarks"].explode().dropna().value_counts()
-    return [{"remark": str(text), "n": int(n)} for text, n in counts.items()]
-
-
-def independent_runs(table: RunTable) -> RunTable:
-    """The rows whose inputs are independent samples of their distributions."""
-    sampling = table.sampling
-    if sampling is None or sampling.method != SALTELLI:
-        return table
-    kept = table.frame["variant"].isin(base_samples(sampling))
-    return table._replace(frame=table.frame[kept])
-
-
-def base_samples(sampling: SamplingTable) -> set[str]:
-    """Names of the samples of Saltelli's two base matrices: first and last of each block."""
-    block = sampling.block
-    return {sample_name(block * i + place) for i in range(sampling.n) for place in (1, block)}
-
-
-def failing(table: RunTable) -> list[Row]:
-    """Probability that each acceptance criterion fails, and that any does.
-
-    A run counts for a criterion that was judged in it. Without a column ``judged`` every criterion
-    that fails in some run is taken as judged in all runs with a verdict.
-    """
-    done = table.done
-    if "failed" not in done:
-        return []
-    # Rows of a run have all its criteria each, or those of their pantograph.
-    runs_of = done.groupby("variant", sort=False)
-    failed = [_united(own) for _, own in runs_of["failed"]]
-    if "judged" in done:
-        judged = [
-            list(dict.fromkeys([*_united(own), *more]))
-            for (_, own), more in zip(runs_of["judged"], failed, strict=True)
-        ]
-    else:
-        every = list(dict.fromkeys(name for own in failed for name in own))
-        known = runs_of["passed"].count() > 0 if "passed" in done else [True] * len(failed)
-        judged = [every if one else [] for one in known]
-    runs = list(zip(judged, failed, strict=True))
-    rows = []
-    for name in dict.fromkeys(name for own in judged for name in own):
-        hits = [name in lost for own, lost in runs if name in own]
-        rows.append(_probability(name, sum(hits), len(hits)))
-    if rows:
-        hits = [bool(lost) for own, lost in runs if own]
-        rows.append(_probability(ANY_CRITERION, sum(hits), len(hits)))
-    return rows
-
-
-def _united(lists: Iterable[Sequence[str]]) -> list[str]:
-    """The criteria of all rows of a run, each once."""
-    return list(dict.fromkeys(name for own in lists for name in own))
-
-
-def _probability(criterion: str, failed: int, n: int) -> Row:
-    head = {"criterion": criterion, "n": n, "failed": failed}
-    return {**head, **named("probability", share(failed, n))}

@@ -15,10 +15,10 @@ from catenary.cases.scene.input.plain_text import plain
 from catenary.cases.studies.sampling.tables import ChoicesTable, SamplingTable, sampling_of
 from catenary.cases.studies.sweep.jobs import OF_LINE
 from catenary.cases.studies.sweep.output import PARQUET, TABLE
+from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.report.study_table import Content
 
 SAMPLING = "sampling.json"
-DONE = "done"
 # Columns with a list of words in each cell, which CSV joins.
 _LISTS = ("failed", "judged", "remarks")
 _JOINT = "; "

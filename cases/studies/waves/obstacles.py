@@ -78,7 +78,7 @@ def measured(
 
     Returns
     -------
-    back, onward : (f, n, n) complex, as `scattering.scattered` returns them; onward is zero beyond
+    back, onward : (f, n, n) complex, as `reflection.scattered` returns them; onward is zero beyond
         an end
     omega : (f,) angular frequencies of the discrete motion, (2 / dt) tan(w dt / 2) for the angular
         frequency w and steps of average acceleration [1/s]

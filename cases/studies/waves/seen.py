@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from catenary.base.errors import InputError
 from catenary.cases.studies.waves.theory import HIGHEST, WaveTheory, row_of
-from catenary.meshgen.mesh import DROPPERS, LineMesh
+from catenary.meshgen.mesh import DROPPERS
 from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.switching_links import some_of, switching_links
@@ -26,6 +26,24 @@ from catenary.solver.waves.excitation import Excitation, MovingForce
 
 # Distance of points along the wire between which the motion is interpolated [m].
 _STEP = 0.5
+# Length of the stretches of line that energy is summed over [m].
+STRETCH = 2.0
+# Displacements of a node along x, y and z, and slopes of the latter two.
+_ALONG_AXES, _SLOPES = ("u", "v", "w"), ("", "theta_z", "theta_y")
+# Length beside an end of a window in which a spline still swings after the step there [m].
+_FROM_END = 4.0
+# A band is so many widths to both sides, and lies within a branch [-]; its largest width [Hz].
+_WIDTHS, _WIDEST = 4.0, 0.2
+# Narrower bands last too long [Hz]; a record has so many deviations of a signal in time behind its
+# centre [-].
+_NARROWEST, _LATE = 0.03, 1.3
+# Share of a record, at its end, over which a signal is let fade before its spectrum is taken.
+_FADED = 0.25
+# The fastest waves up to these frequencies are measured [Hz].
+_UP_TO = (0.5 * HIGHEST, HIGHEST)
+# Spans from the blow to the first station, least spans from there to the second, and which share of
+# the line between blow and end lies before the second.
+_FIRST, _APART, _SHARE = 2, 3, 0.5
 
 
 @dataclass(frozen=True)
@@ -168,14 +186,6 @@ def course_of(excitation: Excitation) -> tuple[Callable[[np.ndarray], np.ndarray
     return lambda times: np.zeros((times.size, 0)), excitation.at
 
 
-# Length of the stretches of line that energy is summed over [m].
-STRETCH = 2.0
-# Displacements of a node along x, y and z, and slopes of the latter two.
-_ALONG_AXES, _SLOPES = ("u", "v", "w"), ("", "theta_z", "theta_y")
-# Length beside an end of a window in which a spline still swings after the step there [m].
-_FROM_END = 4.0
-
-
 @dataclass(frozen=True)
 class EnergySeen:
     """Energy of the line relative to its rest, over t times and n stretches.
@@ -261,7 +271,7 @@ class EnergyMotion:
         model, mesh = rest.model, rest.mesh
         self._nodes = np.arange(mesh.n_nodes) if nodes is None else nodes
         self._numbering = model.numbering
-        self._pieces = list(_pieces(mesh))
+        self._pieces = [piece for name in mesh.wires for piece in mesh.pieces(name)]
         self._stiffness, self._mass = (
             whole_matrix(model, **kind).tocsr() for kind in ({"stiffness": 1.0}, {"mass": 1.0})
         )
@@ -328,30 +338,6 @@ class EnergyMotion:
         unknowns, weights, law = self._links
         beyond = law["rest"] + law["stiffness"] * (weights * d[unknowns]).sum(axis=1)
         return -law["released"] * np.minimum(beyond, 0.0) ** 2 / (2.0 * law["stiffness"])
-
-
-def _pieces(mesh: LineMesh) -> list[np.ndarray]:
-    """Nodes of each piece of each wire in order of x."""
-    none = np.zeros(0, dtype=int)
-    return [
-        part
-        for name, nodes in mesh.wires.items()
-        for part in np.split(nodes, mesh.breaks.get(name, none))
-    ]
-
-
-# A band is so many widths to both sides, and lies within a branch [-]; its largest width [Hz].
-_WIDTHS, _WIDEST = 4.0, 0.2
-# Narrower bands last too long [Hz]; a record has so many deviations of a signal in time behind its
-# centre [-].
-_NARROWEST, _LATE = 0.03, 1.3
-# Share of a record, at its end, over which a signal is let fade before its spectrum is taken.
-_FADED = 0.25
-# The fastest waves up to these frequencies are measured [Hz].
-_UP_TO = (0.5 * HIGHEST, HIGHEST)
-# Spans from the blow to the first station, least spans from there to the second, and which share of
-# the line between blow and end lies before the second.
-_FIRST, _APART, _SHARE = 2, 3, 0.5
 
 
 class Arrived(NamedTuple):
@@ -438,7 +424,7 @@ def measured_rows(
             "bands of the periodic line"
         )
         rows.append(row_of("energy_in_pass_bands", spectrum.inside, "-", note))
-    branches = [branch_of_fastest(waves, highest) for highest in _UP_TO]
+    branches = [_branch_of_fastest(waves, highest) for highest in _UP_TO]
     if np.array_equal(branches[0][0], branches[1][0]):
         del branches[1:]  # one has the fastest wave of all
     for number, (frequency, velocity) in enumerate(branches, start=1):
@@ -534,7 +520,7 @@ def _stations(theory: WaveTheory, seen: WavesSeen) -> tuple[int, int] | None:
     return first, second
 
 
-def branch_of_fastest(waves: BlochWaves, highest: float) -> tuple[np.ndarray, np.ndarray]:
+def _branch_of_fastest(waves: BlochWaves, highest: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (n,), ascending [Hz], and group velocities [m/s] of the branch that has the
     fastest wave up to the frequency ``highest`` [Hz]."""
     speed = np.where(waves.frequency <= highest, np.abs(waves.group_velocity), 0.0)

@@ -86,6 +86,256 @@ _KINDS = {
     "duration": (PULSE, HAMMER),
     "impulse": (HAMMER,),
 }
+Row = dict[str, Any]
+TABLE, OBSTACLES = "waves.csv", "obstacles.csv"
+# Snapshots that show waves up to 20 Hz, and five of them a period at 20 Hz [s].
+SNAPSHOT_EVERY = 0.01
+# Of a blow, whose waves are shorter [s].
+BLOW_EVERY = 0.004
+# Length of line that is shown behind and ahead of the train [m].
+_BEHIND, _AHEAD = 300.0, 200.0
+
+
+def study_waves(folder: Path) -> tuple[str, list[Path]]:
+    """Write pictures and tables of the waves into a run's folder; a text for terminals, and the
+    files. Not collective.
+
+    Raises
+    ------
+    InputError
+        If there is no run with snapshots, or nothing can be written.
+    """
+    with Results(folder, examined(folder)) as results:
+        data = film_data(results)
+        with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
+            snapshots.need_whole()
+            scene = recorded_scene(results.attributes["config"], folder)
+            problem = problem_of(scene)
+            rest = line_at_rest(problem, mesh_of(scene))
+            numbers = np.empty(rest.mesh.n_nodes, dtype=np.int64)  # of the nodes in the run
+            for name, nodes in rest.mesh.wires.items():
+                numbers[nodes] = data.wires[name]
+            if {"u", "v"} & set(rest.model.unknowns) and not snapshots.has_vectors:
+                raise InputError(
+                    f"{folder / 'fields.h5'} has the uplift alone, and the energy of this line is "
+                    'that of all its motions; run the scene again with "displacement" in '
+                    "output.fields"
+                )
+            energy = EnergyMotion(rest, numbers)
+            seen = waves_seen(data, snapshots, [energy])
+            ends = np.array([snapshots.moving(n) for n in range(snapshots.times.size)])
+            moving = np.column_stack(
+                [np.maximum(ends[1:, 0], ends[:-1, 0]), np.minimum(ends[1:, 1], ends[:-1, 1])]
+            )
+        remarks = all_remarks(results, indicate(results))
+    theory = wave_theory(problem, rest)
+    what = "train"
+    if data.excitation is not None:
+        what = "force" if isinstance(data.excitation, MovingForce) else "blow"
+    waves = energy.seen().within(moving)
+    return _write_waves(folder, theory, rest, seen, waves, data.supports, what, remarks)
+
+
+def study_excited(
+    scene: Scene, kind: str, settings: Excited, folder: Path, force: bool
+) -> tuple[str, list[Path]]:
+    """Run a line without its train under an excitation, and write the waves that are seen; a text
+    for terminals, and the files. Serial.
+
+    The folder then has the files of a run.
+
+    Parameters
+    ----------
+    scene : checked scene of the line
+    kind : of the excitation, see `excitation.KINDS`
+    settings : of the excitation
+    folder : new, or empty, unless ``force`` is given
+    force : whether earlier results there are replaced
+
+    Raises
+    ------
+    InputError
+        If a setting is impossible, or the folder is not empty.
+    RunBroken
+        If the march breaks.
+    """
+    problem = problem_of(scene)
+    excitation = excitation_of(kind, settings, problem, problem.numerics.dt)
+    refuse_earlier(folder, force)
+    refuse_table(folder / TABLE, force)
+    moves = isinstance(excitation, MovingForce)
+    every = SNAPSHOT_EVERY if moves else BLOW_EVERY
+    found: list[tuple[LineAtRest, WireMotion, EnergyMotion]] = []
+
+    def watching(rest: LineAtRest) -> list[Observer]:
+        wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
+        found.append((rest, wire, EnergyMotion(rest)))
+        return [Watch(max(1, round(every / problem.numerics.dt)), found[-1][1:])]
+
+    run = ExcitedRun(without_train(problem, excitation), excitation, every, watching)
+    ended = run_case(scene, folder, MPI.COMM_SELF, force=force, only_summary=True, excited=run)
+    if ended.outcome != "done":
+        raise RunBroken(ended.outcome)
+    ((rest, wire, energy),) = found
+    theory = wave_theory(problem, rest)
+    supports = problem.line.support_positions[1:-1]
+    what = "force" if moves else "blow"
+    seen = wire.seen(*course_of(excitation))
+    remarks = ended.summary["remarks"]
+    return _write_waves(folder, theory, rest, seen, energy.seen(), supports, what, remarks)
+
+
+def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[Path]]:
+    """Measure the obstacles of a scene's line; a text for terminals, and the files. Serial.
+
+    Raises
+    ------
+    InputError
+        If the folder holds such a table and ``force`` is not given, or if a wire is carried by its
+        bending.
+    """
+    refuse_table(folder / OBSTACLES, force)
+    problem = problem_of(scene)
+    for wire in problem.line.wires:
+        if bends(slowest_wave_of(problem.line, wire), wire.tension, wire.mass_per_length):
+            raise InputError(
+                f"--obstacles measures wires under tension; {wire.name} carries waves by bending, "
+                "whose speeds are too different for a window in time to part what comes from what "
+                "goes back"
+            )
+    rest = line_at_rest(problem, mesh_of(scene))
+    results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
+    lines = [
+        f"{one.name.replace('_', ' ')}: measured within {100.0 * one.error.max():.2g} % of theory"
+        for one in results
+    ]
+    files = write_files(
+        folder,
+        {
+            OBSTACLES: obstacles.as_rows(results),
+            "obstacles.png": lambda: obstacles.picture(results),
+        },
+    )
+    return "\n".join(lines), files
+
+
+def _write_waves(
+    folder: Path,
+    theory: WaveTheory,
+    rest: LineAtRest,
+    seen: WavesSeen,
+    energy: EnergySeen,
+    supports: np.ndarray,
+    what: str,
+    remarks: list[str],
+) -> tuple[str, list[Path]]:
+    """Text, and pictures of the waves that are seen, and tables with theory beside them."""
+    moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
+    until = min((incident.time for incident in rest.model.simulated.incidents), default=np.inf)
+    if until < energy.time[-1]:
+        energy = energy.until(until)
+        remarks = [*remarks, f"Energies end at {until:g} s, when an incident changes the line."]
+    reflections, spectra = reflections_of(rest), transmitted(theory, seen)
+    measured = [
+        *measured_rows(theory, seen, spectra), *reflection_rows(reflections, theory.speed)
+    ]  # fmt: skip
+    content: dict[str, Content] = {
+        "energy.csv": _energy_rows(energy, seen) if energy.time.size > 1 else [],
+        TABLE: [*as_rows(theory), *measured],
+        "pass_bands.csv": _band_rows(theory),
+        "space_time.png": lambda: pictures.space_time(seen, theory, supports, moving),
+        "wavenumbers.png": lambda: pictures.wavenumbers(seen, theory, what),
+        "energy.png": lambda: (
+            pictures.energy_parts(energy, seen, origin) if energy.time.size > 1 else None
+        ),
+    }
+    if reflections:
+        both = rest.problem.ends
+        content["end_reflection.png"] = lambda: draw_reflections(reflections, both, theory.speed)
+        content["end_reflection.csv"] = curve_rows(reflections)
+    if spectra is not None:
+        content["transmission.png"] = lambda: pictures.transmission(spectra)
+    if seen.position.shape[1]:
+        content["train_frame.png"] = lambda: pictures.train_frame(
+            seen, theory, _BEHIND, _AHEAD, origin
+        )
+    return _as_text(theory, measured, remarks), write_files(folder, content)
+
+
+def _energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
+    """Energy of the line over time [J]: behind, between and ahead of the moving sources.
+
+    ``seen`` has the places of the pantographs or of a moving force, or the place of a blow.
+    """
+    behind, between, ahead = energy.parts(places_of(seen, energy.time))
+    columns = energy.time, behind, between, ahead, behind + between + ahead
+    names = ("time_s", "behind_J", "between_J", "ahead_J", "total_J")
+    return [dict(zip(names, row, strict=True)) for row in np.column_stack(columns).tolist()]
+
+
+def as_rows(theory: WaveTheory) -> list[Row]:
+    """Figures with unit and meaning; those that the line does not have are left out."""
+    of_string = "" if theory.by_bending else ", sqrt(T / m)"
+    doppler = "Doppler factor of an echo from ahead, (c - v) / (c + v)"
+    sent_back = "reflection coefficient of a stiff dropper on the contact wire, Z_m / (Z_c + Z_m)"
+    grows = (
+        "amplification of a wave between head and dropper, reflection coefficient / Doppler factor"
+    )
+    rows = [
+        ("train_speed", theory.speed, "m/s", "speed of the train"),
+        ("wave_speed", theory.wave_speed, "m/s", f"slowest wave of the contact wire{of_string}"),
+        ("doppler_factor", theory.doppler, "-", doppler),
+        ("dropper_reflection", theory.reflection, "-", sent_back),
+        ("amplification", theory.amplification, "-", grows),
+    ]
+    if theory.bloch is not None:
+        speed, at = theory.bloch.fastest(20.0)
+        rows += [
+            (
+                "fastest_group_velocity",
+                speed,
+                "m/s",
+                "greatest group velocity of the periodic line up to 20 Hz",
+            ),
+            (
+                "frequency_of_the_fastest",
+                at,
+                "Hz",
+                "frequency of the wave with the greatest group velocity",
+            ),
+        ]
+    return [row_of(*row) for row in rows if np.isfinite(row[1])]
+
+
+def _band_rows(theory: WaveTheory) -> list[Row]:
+    """Pass bands of the periodic line, and ranges that outrun the train [Hz]."""
+    found = {"pass band": theory.bands(), "outruns the train": theory.outrunning()}
+    return [
+        {"what": what, "from_Hz": float(low), "to_Hz": float(high)}
+        for what, bands in found.items()
+        for low, high in bands
+    ]
+
+
+def _as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str]) -> str:
+    """Figures of theory and ``measured`` ones for a terminal, and ``remarks`` on the run that shows
+    the waves."""
+    rows = [*as_rows(theory), *measured]
+    units = {"-": ""}
+    lines = [
+        f"{row['meaning']}: {row['value']:.4g} {units.get(row['unit'], row['unit'])}".rstrip()
+        for row in rows
+    ]
+    for what, bands in (
+        ("Pass bands", theory.bands()),
+        ("Faster than the train", theory.outrunning()),
+    ):
+        text = ", ".join(f"{low:.2f}-{high:.2f}" for low, high in bands)
+        if text:
+            lines.append(f"{what}: {text} Hz")
+    if theory.why_not:
+        lines.append(f"No pass bands: {theory.why_not}")
+    return "\n".join([*lines, *(f"REMARK      {text}" for text in remarks)])
 
 
 def excitation_of(kind: str, settings: Excited, problem: Problem, dt: float) -> Excitation:
@@ -246,255 +496,3 @@ class Watch(Observer):
                 moved[self._nodes, axis] = view.node_motion(name, False)
             for one in self._seen:
                 one.add(view.time, moved)
-
-
-Row = dict[str, Any]
-TABLE, OBSTACLES = "waves.csv", "obstacles.csv"
-# Snapshots that show waves up to 20 Hz, and five of them a period at 20 Hz [s].
-SNAPSHOT_EVERY = 0.01
-# Of a blow, whose waves are shorter [s].
-BLOW_EVERY = 0.004
-# Length of line that is shown behind and ahead of the train [m].
-_BEHIND, _AHEAD = 300.0, 200.0
-
-
-def study_waves(folder: Path) -> tuple[str, list[Path]]:
-    """Write pictures and tables of the waves into a run's folder; a text for terminals, and the
-    files. Not collective.
-
-    Raises
-    ------
-    InputError
-        If there is no run with snapshots, or nothing can be written.
-    """
-    with Results(folder, examined(folder)) as results:
-        data = film_data(results)
-        with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
-            snapshots.need_whole()
-            scene = recorded_scene(results.attributes["config"], folder)
-            problem = problem_of(scene)
-            rest = line_at_rest(problem, mesh_of(scene))
-            numbers = np.empty(rest.mesh.n_nodes, dtype=np.int64)  # of the nodes in the run
-            for name, nodes in rest.mesh.wires.items():
-                numbers[nodes] = data.wires[name]
-            if {"u", "v"} & set(rest.model.unknowns) and not snapshots.has_vectors:
-                raise InputError(
-                    f"{folder / 'fields.h5'} has the uplift alone, and the energy of this line is "
-                    'that of all its motions; run the scene again with "displacement" in '
-                    "output.fields"
-                )
-            energy = EnergyMotion(rest, numbers)
-            seen = waves_seen(data, snapshots, [energy])
-            ends = np.array([snapshots.moving(n) for n in range(snapshots.times.size)])
-            moving = np.column_stack(
-                [np.maximum(ends[1:, 0], ends[:-1, 0]), np.minimum(ends[1:, 1], ends[:-1, 1])]
-            )
-        remarks = all_remarks(results, indicate(results))
-    theory = wave_theory(problem, rest)
-    what = "train"
-    if data.excitation is not None:
-        what = "force" if isinstance(data.excitation, MovingForce) else "blow"
-    waves = energy.seen().within(moving)
-    return _write(folder, theory, rest, seen, waves, data.supports, what, remarks)
-
-
-def study_excited(
-    scene: Scene, kind: str, settings: Excited, folder: Path, force: bool
-) -> tuple[str, list[Path]]:
-    """Run a line without its train under an excitation, and write the waves that are seen; a text
-    for terminals, and the files. Serial.
-
-    The folder then has the files of a run.
-
-    Parameters
-    ----------
-    scene : checked scene of the line
-    kind : of the excitation, see `excitation.KINDS`
-    settings : of the excitation
-    folder : new, or empty, unless ``force`` is given
-    force : whether earlier results there are replaced
-
-    Raises
-    ------
-    InputError
-        If a setting is impossible, or the folder is not empty.
-    RunBroken
-        If the march breaks.
-    """
-    problem = problem_of(scene)
-    excitation = excitation_of(kind, settings, problem, problem.numerics.dt)
-    refuse_earlier(folder, force)
-    refuse_table(folder / TABLE, force)
-    moves = isinstance(excitation, MovingForce)
-    every = SNAPSHOT_EVERY if moves else BLOW_EVERY
-    found: list[tuple[LineAtRest, WireMotion, EnergyMotion]] = []
-
-    def watching(rest: LineAtRest) -> list[Observer]:
-        wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
-        found.append((rest, wire, EnergyMotion(rest)))
-        return [Watch(max(1, round(every / problem.numerics.dt)), found[-1][1:])]
-
-    run = ExcitedRun(without_train(problem, excitation), excitation, every, watching)
-    ended = run_case(scene, folder, MPI.COMM_SELF, force=force, only_summary=True, excited=run)
-    if ended.outcome != "done":
-        raise RunBroken(ended.outcome)
-    ((rest, wire, energy),) = found
-    theory = wave_theory(problem, rest)
-    supports = problem.line.support_positions[1:-1]
-    what = "force" if moves else "blow"
-    seen = wire.seen(*course_of(excitation))
-    remarks = ended.summary["remarks"]
-    return _write(folder, theory, rest, seen, energy.seen(), supports, what, remarks)
-
-
-def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[Path]]:
-    """Measure the obstacles of a scene's line; a text for terminals, and the files. Serial.
-
-    Raises
-    ------
-    InputError
-        If the folder holds such a table and ``force`` is not given, or if a wire is carried by its
-        bending.
-    """
-    refuse_table(folder / OBSTACLES, force)
-    problem = problem_of(scene)
-    for wire in problem.line.wires:
-        if bends(slowest_wave_of(problem.line, wire), wire.tension, wire.mass_per_length):
-            raise InputError(
-                f"--obstacles measures wires under tension; {wire.name} carries waves by bending, "
-                "whose speeds are too different for a window in time to part what comes from what "
-                "goes back"
-            )
-    rest = line_at_rest(problem, mesh_of(scene))
-    results = [obstacles.result_of(one, problem) for one in obstacles.obstacles_of(rest)]
-    lines = [
-        f"{one.name.replace('_', ' ')}: measured within {100.0 * one.error.max():.2g} % of theory"
-        for one in results
-    ]
-    files = write_files(
-        folder,
-        {
-            OBSTACLES: obstacles.as_rows(results),
-            "obstacles.png": lambda: obstacles.picture(results),
-        },
-    )
-    return "\n".join(lines), files
-
-
-def _write(
-    folder: Path,
-    theory: WaveTheory,
-    rest: LineAtRest,
-    seen: WavesSeen,
-    energy: EnergySeen,
-    supports: np.ndarray,
-    what: str,
-    remarks: list[str],
-) -> tuple[str, list[Path]]:
-    """Text, and pictures of the waves that are seen, and tables with theory beside them."""
-    moving, origin = ("pantographs", "first pantograph") if what == "train" else (what, what)
-    until = min((incident.time for incident in rest.model.simulated.incidents), default=np.inf)
-    if until < energy.time[-1]:
-        energy = energy.until(until)
-        remarks = [*remarks, f"Energies end at {until:g} s, when an incident changes the line."]
-    reflections, spectra = reflections_of(rest), transmitted(theory, seen)
-    measured = [
-        *measured_rows(theory, seen, spectra), *reflection_rows(reflections, theory.speed)
-    ]  # fmt: skip
-    content: dict[str, Content] = {
-        "energy.csv": energy_rows(energy, seen) if energy.time.size > 1 else [],
-        TABLE: [*as_rows(theory), *measured],
-        "pass_bands.csv": band_rows(theory),
-        "space_time.png": lambda: pictures.space_time(seen, theory, supports, moving),
-        "wavenumbers.png": lambda: pictures.wavenumbers(seen, theory, what),
-        "energy.png": lambda: (
-            pictures.energy_parts(energy, seen, origin) if energy.time.size > 1 else None
-        ),
-    }
-    if reflections:
-        both = rest.problem.ends
-        content["end_reflection.png"] = lambda: draw_reflections(reflections, both, theory.speed)
-        content["end_reflection.csv"] = curve_rows(reflections)
-    if spectra is not None:
-        content["transmission.png"] = lambda: pictures.transmission(spectra)
-    if seen.position.shape[1]:
-        content["train_frame.png"] = lambda: pictures.train_frame(
-            seen, theory, _BEHIND, _AHEAD, origin
-        )
-    return as_text(theory, measured, remarks), write_files(folder, content)
-
-
-def energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
-    """Energy of the line over time [J]: behind, between and ahead of the moving sources.
-
-    ``seen`` has the places of the pantographs or of a moving force, or the place of a blow.
-    """
-    behind, between, ahead = energy.parts(places_of(seen, energy.time))
-    columns = energy.time, behind, between, ahead, behind + between + ahead
-    names = ("time_s", "behind_J", "between_J", "ahead_J", "total_J")
-    return [dict(zip(names, row, strict=True)) for row in np.column_stack(columns).tolist()]
-
-
-def as_rows(theory: WaveTheory) -> list[Row]:
-    """Figures with unit and meaning; those that the line does not have are left out."""
-    of_string = "" if theory.by_bending else ", sqrt(T / m)"
-    doppler = "Doppler factor of an echo from ahead, (c - v) / (c + v)"
-    sent_back = "reflection coefficient of a stiff dropper on the contact wire, Z_m / (Z_c + Z_m)"
-    grows = (
-        "amplification of a wave between head and dropper, reflection coefficient / Doppler factor"
-    )
-    rows = [
-        ("train_speed", theory.speed, "m/s", "speed of the train"),
-        ("wave_speed", theory.wave_speed, "m/s", f"slowest wave of the contact wire{of_string}"),
-        ("doppler_factor", theory.doppler, "-", doppler),
-        ("dropper_reflection", theory.reflection, "-", sent_back),
-        ("amplification", theory.amplification, "-", grows),
-    ]
-    if theory.bloch is not None:
-        speed, at = theory.bloch.fastest(20.0)
-        rows += [
-            (
-                "fastest_group_velocity",
-                speed,
-                "m/s",
-                "greatest group velocity of the periodic line up to 20 Hz",
-            ),
-            (
-                "frequency_of_the_fastest",
-                at,
-                "Hz",
-                "frequency of the wave with the greatest group velocity",
-            ),
-        ]
-    return [row_of(*row) for row in rows if np.isfinite(row[1])]
-
-
-def band_rows(theory: WaveTheory) -> list[Row]:
-    """Pass bands of the periodic line, and ranges that outrun the train [Hz]."""
-    found = {"pass band": theory.bands(), "outruns the train": theory.outrunning()}
-    return [
-        {"what": what, "from_Hz": float(low), "to_Hz": float(high)}
-        for what, bands in found.items()
-        for low, high in bands
-    ]
-
-
-def as_text(theory: WaveTheory, measured: list[Row], remarks: Sequence[str]) -> str:
-    """Figures of theory and ``measured`` ones for a terminal, and ``remarks`` on the run that shows
-    the waves."""
-    rows = [*as_rows(theory), *measured]
-    units = {"-": ""}
-    lines = [
-        f"{row['meaning']}: {row['value']:.4g} {units.get(row['unit'], row['unit'])}".rstrip()
-        for row in rows
-    ]
-    for what, bands in (
-        ("Pass bands", theory.bands()),
-        ("Faster than the train", theory.outrunning()),
-    ):
-        text = ", ".join(f"{low:.2f}-{high:.2f}" for low, high in bands)
-        if text:
-            lines.append(f"{what}: {text} Hz")
-    if theory.why_not:
-        lines.append(f"No pass bands: {theory.why_not}")
-    return "\n".join([*lines, *(f"REMARK      {text}" for text in remarks)])

@@ -12,6 +12,7 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.meshgen.wires import Role
+from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.report.pictures import figures
 from catenary.solver.ends import SIDES
 from catenary.solver.model.matrices import stiffness_matrix, whole_matrix
@@ -67,7 +68,7 @@ class WaveTheory:
         # Wires of one speed, such as those of two tension sections, are one line in pictures.
         wires: dict[str, tuple[float, str]] = {}
         for name, speed in self.wires:
-            words = f"{name.replace('_', ' ')} {self._as}"
+            words = f"{wire_words(name)} {self._as}"
             wires.setdefault(f"{speed:.6g}", (speed, words))
         found = list(wires.values())
         if self.bloch is not None:

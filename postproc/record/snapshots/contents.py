@@ -27,6 +27,11 @@ FIXED = -1
 # from there [m].
 BESIDE, _ABOVE, _ARM_RISE = 3.0, 0.4, 0.3
 _NONE = np.zeros(0, dtype=np.int64)
+_Count = TypeVar("_Count", int, np.ndarray)
+# Unknowns of a node that fields are made of: upward and lateral displacement, slopes dw/dx and
+# dv/dx, and displacement along the track.
+UP, ASIDE, SLOPE, TURN, ALONG = "w", "v", "theta_y", "theta_z", "u"
+USUAL_FIELDS = ("uplift", "displacement")
 
 
 class RecordedLine(NamedTuple):
@@ -145,13 +150,6 @@ def _masts(x: np.ndarray, top: float) -> Block:
     return Block(MASTS, np.full(2 * n, FIXED), ends.reshape(-1, 3), True)
 
 
-_Count = TypeVar("_Count", int, np.ndarray)
-
-# Unknowns of a node that fields are made of: upward and lateral displacement, slopes dw/dx and
-# dv/dx, and displacement along the track.
-UP, ASIDE, SLOPE, TURN, ALONG = "w", "v", "theta_y", "theta_z", "u"
-
-
 @dataclass(frozen=True)
 class FieldKind:
     """A field of snapshots.
@@ -250,7 +248,6 @@ KINDS: dict[str, FieldKind] = {
 
 # Fields that a scene may choose: the state of droppers comes with their force.
 FIELDS = tuple(name for name in KINDS if name != "dropper_state")
-USUAL_FIELDS = ("uplift", "displacement")
 
 
 def kinds_of(chosen: tuple[str, ...]) -> tuple[FieldKind, ...]:

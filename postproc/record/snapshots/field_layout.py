@@ -44,7 +44,7 @@ class FieldRecord:
 
     Attributes
     ----------
-    fields : names of `field_kinds.FIELDS`
+    fields : names of `contents.FIELDS`
     parts : names of wires and `contents.OTHER_PARTS`, None for all
     stretch : from and to along the track [m], None for the whole line
     window : how far behind the last and ahead of the first pantograph [m], None for everything

@@ -56,6 +56,20 @@ logger = logging.getLogger("catenary.fields")
 
 # Rows of a table that are copied at once.
 _ROWS_OF_COPY = 1 << 16
+_HIDE, _END = b"<![CDATA[", b"]]>"
+_SHOW = b" " * len(_HIDE)
+_BEGIN = b"""\
+<?xml version="1.0" encoding="UTF-8"?>
+<Xdmf Version="3.0">
+  <Domain>
+    <Grid Name="line" GridType="Collection" CollectionType="Spatial">
+"""
+_CLOSE = b"    </Grid>\n  </Domain>\n</Xdmf>\n"
+_BLOCK_CLOSE = b"      </Grid>\n"
+# Readers take the numbers from their places in the file, as they stand there.
+_KINDS = {
+    "<f4": ("Float", 4), "<f8": ("Float", 8), "<i4": ("Int", 4), "|i1": ("Char", 1),
+}  # fmt: skip
 
 
 class FieldsFile:
@@ -301,7 +315,7 @@ class FieldsFile:
         """List in the XDMF file the snapshots that are there."""
         if self._text is None:
             blocks = {
-                slots.name: grids_of(slots, self._planned, self.path.name, places)
+                slots.name: _grids_of(slots, self._planned, self.path.name, places)
                 for slots, places in zip(self._layout, self._places, strict=True)
             }
             self._text = GrowingXdmf(self._xdmf, blocks, len(self._written))
@@ -319,22 +333,6 @@ def _create(
 def _place_of(group: h5py.Group, name: str) -> int:
     """Offset of a table in the file [B], 0 if it has no numbers; KeyError without one."""
     return h5d.open(group.id, name.encode()).get_offset() or 0
-
-
-_HIDE, _END = b"<![CDATA[", b"]]>"
-_SHOW = b" " * len(_HIDE)
-_BEGIN = b"""\
-<?xml version="1.0" encoding="UTF-8"?>
-<Xdmf Version="3.0">
-  <Domain>
-    <Grid Name="line" GridType="Collection" CollectionType="Spatial">
-"""
-_CLOSE = b"    </Grid>\n  </Domain>\n</Xdmf>\n"
-_BLOCK_CLOSE = b"      </Grid>\n"
-# Readers take the numbers from their places in the file, as they stand there.
-_KINDS = {
-    "<f4": ("Float", 4), "<f8": ("Float", 8), "<i4": ("Int", 4), "|i1": ("Char", 1),
-}  # fmt: skip
 
 
 class GrowingXdmf:
@@ -395,22 +393,11 @@ def _block_begin(name: str) -> bytes:
     return f'      <Grid Name="{name}" GridType="Collection" CollectionType="Temporal">\n'.encode()
 
 
-def grids_of(
+def _grids_of(
     slots: Slots, times: list[float], h5_name: str, offsets: Mapping[str, int]
 ) -> list[str]:
-    """The grids of a block at ``times`` [s].
-
-    Parameters
-    ----------
-    slots : Slots
-        Layout of the block in the file.
-    times : list of float
-        Times of the snapshots [s].
-    h5_name : str
-        File of the numbers, relative to that of the text.
-    offsets : mapping
-        Place in that file at which each table of the block begins, by name [B].
-    """
+    """The grids of a block at ``times`` [s]. ``h5_name`` is the file of the numbers, relative to
+    that of the text, ``offsets`` the place in it at which each table of the block begins [B]."""
     # Grids differ in numbers only: one text for all, into which these are put.
     moves = bool(np.ptp(slots.first) or np.ptp(slots.count))
     file, block = h5_name.replace("%", "%%"), slots.name.replace("%", "%%")

@@ -14,7 +14,7 @@ from h5py import h5d
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from catenary.postproc.files.hdf5 import HDF5_ERRORS
-from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, largest
+from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, count_table, largest
 from catenary.postproc.read.validation import read_attributes, table_values
 from catenary.postproc.record.snapshots.contents import FIXED, KINDS, OTHER_PARTS, FieldKind
 from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, SIZES, BlockTables
@@ -44,18 +44,14 @@ class FieldsAttributes(BaseModel):
     rests_beyond: Literal[0, 1] = Field(default=0, description="0 or 1")
 
 
-def _numbers(dimensions: tuple[str, ...], most: float = 1e12) -> Table:
-    return Table(dimensions, low=0, high=most, whole=True)
-
-
 BLOCK: dict[str, Table] = {
     "points": Table(("point", "xyz"), "m"),
-    "nodes": _numbers(("point",)),
-    "cells": _numbers(("cell", "upper_lower"), 1e9),
-    "first": _numbers(("snapshot",)),
-    "count": _numbers(("snapshot",)),
-    "cell_first": _numbers(("snapshot",)),
-    "cell_count": _numbers(("snapshot",)),
+    "nodes": count_table(("point",)),
+    "cells": count_table(("cell", "upper_lower"), most=1e9),
+    "first": count_table(("snapshot",)),
+    "count": count_table(("snapshot",)),
+    "cell_first": count_table(("snapshot",)),
+    "cell_count": count_table(("snapshot",)),
 }
 
 
@@ -97,7 +93,7 @@ def read_fields(file: h5py.File) -> FieldTables:
     n_planned = clock.shape[0]
     if n_planned > _MOST_SNAPSHOTS:
         raise FieldsFault(f"times has {n_planned} rows, and no run has so many snapshots")
-    sizes = _read(file, SIZES, _numbers(("pantograph",), _MOST_PLACES), {})
+    sizes = _read(file, SIZES, count_table(("pantograph",), most=_MOST_PLACES), {})
     _table(file, PLACES, np.dtype("<f8"), (n_planned, sizes.size + int(sizes.sum())))
     n_nodes = int(about["n_nodes"])
     blocks = {name: _block(file, name, n_planned, n_nodes) for name in about["parts"]}

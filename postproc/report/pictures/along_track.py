@@ -17,15 +17,17 @@ from matplotlib.figure import Figure
 
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
+from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.read.results import Results, in_stretch
-from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.pictures.figures import (
     COLOURS,
     GREY,
     LIGHT,
     SHADE,
     colour,
+    curve,
     legend_above,
+    line,
     own_style,
     stacked,
     thinned,
@@ -36,6 +38,11 @@ from catenary.postproc.report.pictures.figures import (
 
 # More supports or droppers than these are no marks but a grey ground: they are left out.
 _MOST_SUPPORTS, _MOST_DROPPERS = 200, 1000
+POSITION = "position along the track [m]"
+# Label, places along the track (n,) [m], and values (n,) there.
+Curve = tuple[str, np.ndarray, np.ndarray]
+# Marks of a panel: those of equal values let each other be seen.
+_MARKS = ("o", "x", "^", "s")
 
 
 @own_style()
@@ -111,9 +118,7 @@ def mark_line(
     named : bool, optional
         Whether its legend names these marks; of several panels the first one does.
     """
-    low, high = results.evaluation
-    label = "evaluation stretch" if named else None
-    axes.axvspan(low, high, color=SHADE, zorder=0, label=label)
+    _shade(axes, results.evaluation, named)
     _mark_parts(axes, results, start, end, named)
     axes.set_xlim(start, end)
 
@@ -155,7 +160,7 @@ def draw_ranges(axes: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray) ->
 def title_of(results: Results, pantograph: int) -> str:
     """Title of the panel of a pantograph, empty if it is the only one."""
     names = results.pantograph_names()
-    return names[pantograph].capitalize() if len(names) > 1 else ""
+    return capital(names[pantograph]) if len(names) > 1 else ""
 
 
 def travelled(results: Results) -> tuple[float, float]:
@@ -172,15 +177,8 @@ def with_margin(x: np.ndarray) -> tuple[float, float]:
     return float(x.min()) - margin, float(x.max()) + margin
 
 
-_PLACE = "position along the track [m]"
-# Label, places along the track (n,) [m], and values (n,) there.
-Curve = tuple[str, np.ndarray, np.ndarray]
-# Marks of a panel: those of equal values let each other be seen.
-_MARKS = ("o", "x", "^", "s")
-
-
-@figures.own_style()
-def forces(
+@own_style()
+def overlaid_forces(
     panels: Sequence[tuple[str, Sequence[Curve]]],
     evaluated: tuple[float, float] | None = None,
     below: str = "",
@@ -199,22 +197,24 @@ def forces(
     if not panels:
         return None
     n = len(panels)
-    figure, axes = figures.stacked(0.7 + 2.3 * n, n, shared=True)
+    figure, axes = stacked(0.7 + 2.3 * n, n, shared=True)
     for own, (name, curves) in zip(axes, panels, strict=True):
         for number, (label, place, force) in enumerate(curves):
             chosen = thinned(force)
-            look = figures.line(number)
-            figures.curve(own, place[chosen], force[chosen], number, label, look)
+            look = line(number)
+            curve(own, place[chosen], force[chosen], number, label, look)
         _shade(own, evaluated)
         force_of = f"contact force, {below} [N]" if below else "contact force [N]"
-        figures.tidy(own, "", force_of, name.capitalize())
-        figures.legend_above(own)
-    axes[-1].set_xlabel(_PLACE)
+        tidy(own, "", force_of, capital(name))
+        legend_above(own)
+    axes[-1].set_xlabel(POSITION)
     return figure
 
 
-@figures.own_style()
-def uplifts(curves: Sequence[Curve], evaluated: tuple[float, float] | None = None) -> Figure | None:
+@own_style()
+def overlaid_uplifts(
+    curves: Sequence[Curve], evaluated: tuple[float, float] | None = None
+) -> Figure | None:
     """Largest uplifts at supports, as marks; None without any.
 
     Parameters
@@ -226,16 +226,17 @@ def uplifts(curves: Sequence[Curve], evaluated: tuple[float, float] | None = Non
     """
     if not curves:
         return None
-    figure, (axes,) = figures.stacked(3.2, 1)
+    figure, (axes,) = stacked(3.2, 1)
     for number, (label, place, uplift) in enumerate(curves):
         look = _MARKS[number % len(_MARKS)]
-        figures.curve(axes, place, 1e3 * uplift, number, label, look)
+        curve(axes, place, 1e3 * uplift, number, label, look)
     _shade(axes, evaluated)
-    figures.tidy(axes, _PLACE, "largest uplift [mm]")
-    figures.legend_above(axes)
+    tidy(axes, POSITION, "largest uplift [mm]")
+    legend_above(axes)
     return figure
 
 
-def _shade(axes: Axes, evaluated: tuple[float, float] | None) -> None:
+def _shade(axes: Axes, evaluated: tuple[float, float] | None, named: bool = True) -> None:
     if evaluated is not None:
-        axes.axvspan(*evaluated, color=figures.SHADE, zorder=0, label="evaluation stretch")
+        label = "evaluation stretch" if named else None
+        axes.axvspan(*evaluated, color=SHADE, zorder=0, label=label)

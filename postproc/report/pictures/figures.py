@@ -1,4 +1,4 @@
-"""Figures of matplotlib in one style: made empty, labelled, and turned into PNG.
+"""Figures of matplotlib in one style: made empty, labelled, and turned into PNG or SVG.
 
 Nothing here needs a display or touches files. A user's ``matplotlibrc`` changes no picture. Long
 curves are thinned so that every peak stays visible.
@@ -52,6 +52,11 @@ _SHARED_GAP = 0.44
 _MOST_TICKS, STEPS = (8, 5), (1.0, 2.0, 2.5, 5.0, 10.0)
 # Compression of a PNG: a higher level costs half as much time again and saves a twentieth.
 _LEVEL = 3
+# Curves of fewer points are drawn as they are; of others two points a bin, the smallest and the
+# largest value: several bins for each dot of a picture.
+MOST_POINTS, _BINS = 20_000, 5_000
+
+_in_own_style = False  # whether a function of ``own_style`` is at work
 
 
 class FewTicks(MaxNLocator):
@@ -67,9 +72,6 @@ class FewTicks(MaxNLocator):
         slack = 1e-9 * (high - low)
         places = np.asarray(super().tick_values(vmin, vmax))
         return places[(places >= low - slack) & (places <= high + slack)]
-
-
-_in_own_style = False
 
 
 @contextlib.contextmanager
@@ -457,11 +459,6 @@ def _texts(artist: Artist) -> Iterator[Text]:
             yield child.label
         else:
             yield from _texts(child)
-
-
-# Curves of fewer points are drawn as they are; of others two points a bin, the smallest and the
-# largest value: several bins for each dot of a picture.
-MOST_POINTS, _BINS = 20_000, 5_000
 
 
 def thinned(y: np.ndarray) -> np.ndarray | slice:

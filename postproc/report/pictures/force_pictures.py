@@ -235,7 +235,7 @@ def force_histogram(statistics: RunStatistics) -> Figure:
 def lateral_places(results: Results) -> Figure:
     """Lateral position of each contact wire on each strip along the track, and where strips end."""
     shown = {
-        p: [(word or "contact wire", column) for word, column in own.items()]
+        p: [(wire_words(word or "contact_wire"), column) for word, column in own.items()]
         for p, own in enumerate(results.contact_columns())
     }
     label = "position on the strip, to the left [m]"

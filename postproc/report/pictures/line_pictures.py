@@ -19,6 +19,7 @@ from catenary.postproc.evaluate.wording import capital, wire_words
 from catenary.postproc.files.own_files import CHANNEL_PICTURE
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures.along_track import (
+    POSITION,
     draw_ranges,
     mark_line,
     mark_static,
@@ -60,6 +61,10 @@ if TYPE_CHECKING:
 _FAR = 20.0
 # Evaluated arms whose passage is drawn.
 _MOST_ARMS = 60
+# Change of tension that is allowed [%].
+_ALLOWED = 10.0
+# A channel in metres that stays below this is drawn in millimetres [m].
+_SMALL = 0.1
 
 
 @own_style()
@@ -94,7 +99,7 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float) -> Fig
         else:
             along.plot([], [], color=LIMIT, linewidth=1.1, label=f"{label}, far above")
     along.set_ylim(bottom=0.0)
-    tidy(along, "position along the track [m]", "largest uplift [mm]", "All arms")
+    tidy(along, POSITION, "largest uplift [mm]", "All arms")
     legend_above(along)
     return figure
 
@@ -186,7 +191,7 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
     slack = droppers.slackened
     along.plot(x[slack], droppers.lowest[slack], "v", color=LIMIT, ms=4, label="slackened")
     along.axhline(0.0, color=GREY, linewidth=0.8)
-    tidy(along, "position along the track [m]", "dropper force [N]", "All droppers")
+    tidy(along, POSITION, "dropper force [N]", "All droppers")
     legend_above(along)
     return figure
 
@@ -220,12 +225,12 @@ def _draw_profile(axes: Axes, results: Results) -> None:
             color=colour(number),
             linewidth=1.5,
             linestyle="--" if number else "-",
-            label=f"{name.replace('_', ' ')} at rest",
+            label=f"{wire_words(name)} at rest",
         )
     mark_static(axes, results, float(start), float(end))
     tidy(
         axes,
-        "position along the track [m]",
+        POSITION,
         f"height above {level:.3f} m [mm]",
         "Profile at rest",
     )
@@ -246,7 +251,7 @@ def _draw_elasticity(axes: Axes, results: Results) -> None:
                 1e3 * own[known, number],
                 color=colour(number),
                 linestyle="--" if number else "-",
-                label=f"{names[number].replace('_', ' ')} alone",
+                label=f"{wire_words(names[number])} alone",
             )
     look = (GREY, "all contact wires") if len(there) > 1 else (COLOURS[0], "elasticity")
     axes.plot(at, 1e3 * lift, color=look[0], linewidth=1.5, label=look[1])
@@ -255,7 +260,7 @@ def _draw_elasticity(axes: Axes, results: Results) -> None:
     axes.set_ylim(bottom=0.0)
     tidy(
         axes,
-        "position along the track [m]",
+        POSITION,
         "elasticity [mm/N]",
         f"Elasticity along span {results.span_at_rest + 1}",
     )
@@ -290,7 +295,7 @@ def plan_view(results: Results) -> Figure:
         plan.plot(*wire.drawn(wire.y), color=colour(number), linewidth=1.2, label=label)
     plan.plot(registration.x, registration.stagger, "o", ms=3, color=GREY, label="steady arm")
     plan.axhline(0.0, color=GREY, linewidth=0.6, linestyle="--")
-    tidy(plan, "position along the track [m]", "to the left [m]", "Contact wire from above")
+    tidy(plan, POSITION, "to the left [m]", "Contact wire from above")
     legend_above(plan)
     pushed = registration.pushed
     for which, look, label in (
@@ -304,7 +309,7 @@ def plan_view(results: Results) -> Figure:
     forces.axhline(0.0, color=GREY, linewidth=0.8)
     tidy(
         forces,
-        "position along the track [m]",
+        POSITION,
         "force to the left [N]",
         "Radial forces of the steady arms",
     )
@@ -312,10 +317,6 @@ def plan_view(results: Results) -> Figure:
         legend_above(forces)
     forces.set_xlim(plan.get_xlim())
     return figure
-
-
-# Change of tension that is allowed [%].
-_ALLOWED = 10.0
 
 
 @own_style()
@@ -340,7 +341,7 @@ def draw_temperatures(rests: Sequence[LineAtTemperature]) -> Figure:
         if worst > 0.7 * _ALLOWED:
             for side in (-_ALLOWED, _ALLOWED):
                 axes.axhline(side, color=LIMIT, lw=0.9, ls="--")
-        tidy(axes, "position along the track [m]", "change of tension [%]", wire_words(name))
+        tidy(axes, POSITION, "change of tension [%]", wire_words(name))
         if name == names[0]:
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
     ends = panels[-1]
@@ -361,29 +362,25 @@ def draw_temperatures(rests: Sequence[LineAtTemperature]) -> Figure:
     return figure
 
 
-# A channel in metres that stays below this is drawn in millimetres [m].
-_SMALL = 0.1
-
-
 def channel_pictures(results: Results) -> list[tuple[str, str, Callable[[], Figure | None]]]:
     """Name of the file without its end, caption and what draws it, of each such channel."""
     drawn: list[tuple[str, str, Callable[[], Figure | None]]] = []
     for channel in CHANNELS.values():
         if not channel.own_picture and results.has(channel.name) and results.n_rows("time") > 1:
-            draw: Callable[[], Figure | None] = partial(_picture_of, results, channel)
+            draw: Callable[[], Figure | None] = partial(_draw_channel, results, channel)
             drawn.append((picture_name(channel), f"{capital(channel.meaning)}.", draw))
     recorded = results.energies()
     for channel in ENERGIES.values():
         if channel.energy is not None and not channel.own_picture and channel.name in recorded:
-            draw = partial(_of_energy, recorded["time"], recorded[channel.name], channel)
+            draw = partial(_draw_energy, recorded["time"], recorded[channel.name], channel)
             drawn.append((picture_name(channel), f"{capital(channel.meaning)}.", draw))
     return drawn
 
 
-def _picture_of(results: Results, channel: Channel) -> Figure | None:
+def _draw_channel(results: Results, channel: Channel) -> Figure | None:
     if channel.per == WIRE_END:
-        return _at_ends(results, channel)
-    return _on_line(results, channel) if channel.of_line else _of_train(results, channel)
+        return _draw_at_ends(results, channel)
+    return _draw_on_line(results, channel) if channel.of_line else _draw_of_train(results, channel)
 
 
 def picture_name(channel: Channel) -> str:
@@ -391,24 +388,31 @@ def picture_name(channel: Channel) -> str:
     return f"{CHANNEL_PICTURE}{channel.name}"
 
 
+def _word(channel: Channel) -> str:
+    return channel.name.replace("_", " ")
+
+
 def _label(channel: Channel) -> str:
-    return f"{channel.name.replace('_', ' ')} [{channel.unit}]"
+    return f"{_word(channel)} [{channel.unit}]"
 
 
 @own_style()
-def _of_train(results: Results, channel: Channel) -> Figure:
+def _draw_of_train(results: Results, channel: Channel) -> Figure:
     """A panel for each pantograph, a curve for each of its columns."""
-    word = channel.name.replace("_", " ")
+    word = _word(channel)
     shown = {p: [(word, p)] for p in range(results.n_pantographs)}
     if channel.per == STRIP:
         for p, own in enumerate(results.strip_columns()):
             words = [f"strip {n + 1}" for n in range(len(own))] if len(own) > 1 else [word]
             shown[p] = list(zip(words, own, strict=True))
     elif channel.per == WIRE:
-        shown = {p: list(own.items()) for p, own in enumerate(results.wire_columns())}
+        shown = {
+            p: [(wire_words(name), column) for name, column in own.items()]
+            for p, own in enumerate(results.wire_columns())
+        }
     elif channel.per == CONTACT:
         for p, by_name in enumerate(results.contact_columns()):
-            shown[p] = [(name or word, column) for name, column in by_name.items()]
+            shown[p] = [(wire_words(name) or word, column) for name, column in by_name.items()]
     label, factor = _label(channel), 1.0
     columns = [column for curves in shown.values() for _, column in curves]
     if channel.unit == "m" and _largest(results, channel.name, columns) < _SMALL:
@@ -423,20 +427,20 @@ def _largest(results: Results, name: str, columns: Sequence[int]) -> float:
 
 
 @own_style()
-def _on_line(results: Results, channel: Channel) -> Figure:
+def _draw_on_line(results: Results, channel: Channel) -> Figure:
     """The range of each column over the run."""
     x = results.line("arm_x" if channel.per == ARM else "dropper_x")
     low, high = results.extremes(channel.name)
     figure, (axes,) = stacked(3.4, 1)
     mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
     draw_ranges(axes, x, low, high)
-    tidy(axes, "position along the track [m]", _label(channel))
+    tidy(axes, POSITION, _label(channel))
     legend_above(axes)
     return figure
 
 
 @own_style()
-def _at_ends(results: Results, channel: Channel) -> Figure | None:
+def _draw_at_ends(results: Results, channel: Channel) -> Figure | None:
     """A panel for each wire with the history at each of its ends, None if all stay zero."""
     low, high = results.extremes(channel.name)
     if not (np.any(low) or np.any(high)):
@@ -455,7 +459,7 @@ def _at_ends(results: Results, channel: Channel) -> Figure | None:
             time = results.line_time[chosen]
             axes.plot(time, values[chosen], color=colour(k), linewidth=1.2, label=label)
         axes.margins(x=0.0)
-        tidy(axes, "", _label(channel), names[number].replace("_", " "))
+        tidy(axes, "", _label(channel), wire_words(names[number]))
         if own.size:
             legend_above(axes)
     panels[-1].set_xlabel("time [s]")
@@ -463,10 +467,10 @@ def _at_ends(results: Results, channel: Channel) -> Figure | None:
 
 
 @own_style()
-def _of_energy(time: np.ndarray, values: np.ndarray, channel: Channel) -> Figure:
+def _draw_energy(time: np.ndarray, values: np.ndarray, channel: Channel) -> Figure:
     figure, (axes,) = stacked(3.0, 1)
     chosen = thinned(values)
-    axes.plot(time[chosen], values[chosen], color=COLOURS[0], label=channel.name.replace("_", " "))
+    axes.plot(time[chosen], values[chosen], color=COLOURS[0], label=_word(channel))
     axes.margins(x=0.0)
     tidy(axes, "time [s]", _label(channel))
     legend_above(axes)

@@ -32,6 +32,8 @@ _ROWS = (
     ("losses of 5 ms and longer", "arcing_percent", "%", 1.0, 3),
     ("contact height range", "contact_height_range", "mm", 1e3, 1),
 )
+# Places that a table shows all of, and extremes of each kind that it shows of more.
+_FEW, _EXTREMES = 12, 5
 
 
 def contact_force(run: EvaluatedRun) -> Section:
@@ -66,7 +68,6 @@ def _violations(results: Results) -> list[list[str]]:
 
 def _force_pictures(run: EvaluatedRun) -> Iterator[Picture]:
     from catenary.postproc.report.pictures import force_pictures as forces
-    from catenary.postproc.report.pictures.force_pictures import lateral_places
 
     results, statistics = run.results, run.statistics
     if results.n_rows("time") < 2:
@@ -81,7 +82,7 @@ def _force_pictures(run: EvaluatedRun) -> Iterator[Picture]:
         yield Picture("wire_forces", text, lambda: forces.wire_forces(results))
     if results.has("lateral_place"):
         text = "Lateral position of the contact wires on the strips."
-        yield Picture("lateral_place", text, lambda: lateral_places(results))
+        yield Picture("lateral_place", text, lambda: forces.lateral_places(results))
     known = len(statistics.pantographs) - len(statistics.complaints)
     if known > 1:  # of one the table says it all
         text = "Statistics of the contact force in the evaluation stretch, below 20 Hz."
@@ -89,10 +90,6 @@ def _force_pictures(run: EvaluatedRun) -> Iterator[Picture]:
     if known:
         text = "Histogram of the contact force in the evaluation stretch, below 20 Hz."
         yield Picture("histogram", text, lambda: forces.force_histogram(statistics))
-
-
-# Places that a table shows all of, and extremes of each kind that it shows of more.
-_FEW, _EXTREMES = 12, 5
 
 
 def has_statistics(run: EvaluatedRun) -> bool:

@@ -13,8 +13,9 @@ import pytest
 from scipy import signal
 
 import catenary
+from catenary.cases.ambrosio2012 import passages
 from catenary.postproc.channels.header import LineRecord
-from catenary.postproc.evaluate import filters, passages
+from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.files import hdf5
 from catenary.postproc.files.committed_rows import store_extremes

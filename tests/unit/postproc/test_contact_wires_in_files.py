@@ -22,7 +22,7 @@ from catenary.postproc.film.film_data import film_data
 from catenary.postproc.read.results import ContactProfile, LineOfRun, Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report import csv_tables
-from catenary.postproc.report.pictures import force_pictures
+from catenary.postproc.report.pictures import figures, force_pictures, line_pictures
 from catenary.postproc.report.report import write_report
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.line_at_rest import line_at_rest
@@ -150,6 +150,27 @@ def test_the_span_that_is_shown_has_the_usual_wires() -> None:
 
     shown = {middle: Overlapping(middle).reference_span for middle in (70.0, 120.0, 130.0, 220.0)}
     assert shown == {70.0: 1, 120.0: 1, 130.0: 3, 220.0: 4}
+
+
+def test_a_picture_of_the_line_names_the_second_section_of_an_overlap_by_words() -> None:
+    class Overlapping(LineOfRun):
+        span_at_rest = 1
+
+        def __init__(self) -> None:
+            pass
+
+        def line(self, name: str) -> np.ndarray:
+            return np.arange(0.0, 151.0, 50.0) if name == "support_x" else np.zeros(0)
+
+        def contact_profiles(self) -> dict[str, ContactProfile]:
+            x, none = np.array([0.0, 60.0, 90.0, 150.0]), np.zeros(0, dtype=int)
+            flat = ContactProfile(none, x, np.full(4, 5.0))
+            return {FIRST: flat, f"{FIRST}_next": flat}
+
+    _, (axes,) = figures.stacked(3.0, 1)
+    line_pictures._draw_profile(axes, Overlapping())
+    labels = [line.get_label() for line in axes.lines]
+    assert labels[:2] == ["contact wire at rest", "contact wire (next section) at rest"]
 
 
 def test_the_force_on_each_wire_is_recorded_told_and_drawn(

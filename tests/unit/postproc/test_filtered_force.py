@@ -15,7 +15,7 @@ from scipy import signal
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.statistics import evaluate
-from catenary.postproc.files.committed_rows import PATH, ForceFilter
+from catenary.postproc.files.committed_rows import FILTERED_FORCE, ForceFilter
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.results import Run
@@ -39,7 +39,7 @@ def test_the_file_holds_the_force_that_scipys_filter_gives(done: Path) -> None:
     expected = signal.sosfiltfilt(sos, force, axis=0, padlen=300)
     np.testing.assert_array_equal(stored[0], expected)
     with h5py.File(done / "run.h5", "r") as file:
-        table = file[PATH]
+        table = file[FILTERED_FORCE]
         assert [dim[0].name for dim in table.dims] == ["/time", "/pantograph"]
         assert table.fletcher32 and table.attrs["unit"] == b"N" and table.attrs["order"] == 6
 
@@ -63,7 +63,7 @@ def test_statistics_and_indicators_are_the_same_with_and_without_it(
     record_run(whole, make_march(), force_filter=lambda: FILTER)
     shutil.copyfile(whole, path)
     with h5py.File(path, "r+") as file:
-        del file[PATH]
+        del file[FILTERED_FORCE]
     with Results(path) as without:
         expected = evaluate(without), indicate(without)
         force = filters.contact_force(without, 0)
@@ -102,7 +102,7 @@ def test_a_damaged_one_is_left_aside(done: Path, tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     shutil.copyfile(done / "run.h5", path)
     with h5py.File(path, "r") as file:
-        chunk = file[PATH].id.get_chunk_info(0)
+        chunk = file[FILTERED_FORCE].id.get_chunk_info(0)
     content = bytearray(path.read_bytes())
     content[chunk.byte_offset + 7] ^= 0xFF
     path.write_bytes(content)

@@ -56,6 +56,8 @@ def test_a_resonance_that_the_filter_lets_pass_is_told_once() -> None:
     """sqrt(5e4 / 7.2) / 2 pi = 13.3 Hz."""
     (sentence,) = said(7.2, 1e-3, 5e4)
     assert "7.2 kg" in sentence and "13.3 Hz" in sentence and "inside the 20 Hz band" in sentence
+    # Of a Hertzian contact the scene has another key, and a stiffness under the static force.
+    assert "stiffness of the contact" in sentence and "_N_per_m" not in sentence
     # Four times as stiff, 26.5 Hz: its flank still shows below 20 Hz.
     (sentence,) = said(7.2, 1e-3, 2e5)
     assert "26.5 Hz, near the 20 Hz band" in sentence
