@@ -39,6 +39,14 @@ STEP, SPEED = 1e-5, 1e-4
 NEUTRAL = 1e-8
 # A force left on a free motion above this part of the largest one (or of 1 N): not at rest.
 UNBALANCED = 1e-6
+# Names of what is added to the mechanism here.
+WIRE, HELD = "wire on the head", "arm held for a moment"
+MOST_MASSES = 3
+# Bounds of masses [kg], stiffnesses [N/m] and dampings [N s/m]. A lower bound stands for "none".
+BOUNDS = ((1e-2, 1e3), (1e-3, 1e8), (1e-6, 1e6))
+N_STARTS = 24
+# No further start is tried below this rms error.
+EXACT = 1e-8
 
 
 class Mode(NamedTuple):
@@ -292,10 +300,6 @@ def apparent_mass(frequencies: Vector, receptance: np.ndarray) -> np.ndarray:
     return -1.0 / (omega**2 * receptance)
 
 
-# Names of what is added to the mechanism here.
-WIRE, HELD = "wire on the head", "arm held for a moment"
-
-
 @dataclass(frozen=True)
 class HeadResponse:
     """Small motions of a pantograph around rest under a wire that presses on its head.
@@ -392,14 +396,6 @@ def peaks(model: LinearModel, frequencies: Vector) -> tuple[Peak, ...]:
         )
         found.append(Peak(float(best.x), complex(model.receptance([best.x])[0])))
     return tuple(found)
-
-
-MOST_MASSES = 3
-# Bounds of masses [kg], stiffnesses [N/m] and dampings [N s/m]. A lower bound stands for "none".
-BOUNDS = ((1e-2, 1e3), (1e-3, 1e8), (1e-6, 1e6))
-N_STARTS = 24
-# No further start is tried below this rms error.
-EXACT = 1e-8
 
 
 class ChainFit(NamedTuple):

@@ -53,6 +53,12 @@ if TYPE_CHECKING:
 
 # Waves of a sum; over a factor of 33 in wavelength each stands for 3 % of it.
 N_WAVES = 120
+GRAVITY = 9.81
+# Steps of a wave of the fastest own motion, where a course of the track is followed in time, and
+# the shortest step [m].
+_STEPS_PER_WAVE, _SHORTEST = 40, 0.01
+# A spline of the track is followed in such steps [m].
+_FINE = 0.1
 
 
 class Spectrum(NamedTuple):
@@ -143,12 +149,6 @@ def sines(
     random = np.random.default_rng([seed, zlib.crc32(name.encode())])
     phases = random.uniform(0.0, 2.0 * np.pi, N_WAVES)
     return np.sqrt(2.0 * power), np.sqrt(edges[:-1] * edges[1:]), phases
-
-
-GRAVITY = 9.81
-# Steps of a wave of the fastest own motion, where a course of the track is followed in time, and
-# the shortest step [m].
-_STEPS_PER_WAVE, _SHORTEST = 40, 0.01
 
 
 @dataclass(frozen=True)
@@ -384,10 +384,6 @@ class VehicleMotion:
     suspension: Vehicle | None = None
 
 
-# A spline of the track is followed in such steps [m].
-_FINE = 0.1
-
-
 class Motion(NamedTuple):
     """Place [m], velocity [m/s] and acceleration [m/s^2] in one direction."""
 
@@ -471,7 +467,7 @@ def _course(
     if isinstance(source, Table):
         if suspension is None or not source.along_track:
             return _spline(source.points, source.values), source.along_track
-        return _spline(*_roof_course(source, direction, suspension, speed)), True
+        return _spline(*_roof_above(source, direction, suspension, speed)), True
     amplitudes, wave_numbers, phases = source.waves(direction)
     if suspension is not None:
         passed = transfer(suspension, direction, wave_numbers, speed)
@@ -479,7 +475,7 @@ def _course(
     return native.sines_at.bound(amplitudes, wave_numbers, phases), True
 
 
-def _roof_course(
+def _roof_above(
     source: Table, direction: str, suspension: Vehicle, speed: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places and heights of the roof above a track that follows a spline."""

@@ -25,7 +25,7 @@ class SteppedHead(ABC):
     ----------
     stepped : the compiled head, for steps from Python and in the loop of kernels
     head : HeadState, what it predicted last
-    row : inputs of the coming step, see `drives`
+    row : inputs of the coming step, see `interface.named`
 
     Parameters
     ----------

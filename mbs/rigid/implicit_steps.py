@@ -56,6 +56,8 @@ Ways = Callable[[Motion], np.ndarray]
 # Largest error of a row that is left [m, cosine; 1/s], where errors are removed.
 TOLERANCE = 1e-12
 MAX_REMOVALS = 8
+# A pivot of dependent coordinates below this part of the largest one: others are chosen.
+WORN = 1e-4
 
 
 class Prediction(NamedTuple):
@@ -91,7 +93,7 @@ class Stepper:
     ----------
     system : System
     dt : length of a step [s]
-    solver : way of keeping constraints, or its name in `step_solvers.METHODS`
+    solver : way of keeping constraints, or its name in ``METHODS``
     ways : generalised forces of unit forces that are given step by step; none if left out
     substeps : into how many a step is cut
     beta, gamma : Newmark's parameters
@@ -260,10 +262,6 @@ class Stepper:
             f"The joints of the multibody system cannot be kept closed at {time:g} s: they are "
             f"open by {float(np.abs(errors).max()):.2g} m; take shorter steps."
         )
-
-
-# A pivot of dependent coordinates below this part of the largest one: others are chosen.
-WORN = 1e-4
 
 
 class StepSolver(Protocol):
