@@ -13,7 +13,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
-from catenary.meshgen.wires import End
+from catenary.meshgen.wires import SAME_PLACE, End
 
 # Names of the physical groups of a simple catenary's mesh file: lines, then points.
 CONTACT_WIRE = "contact_wire"
@@ -22,7 +22,8 @@ DROPPERS = "droppers"
 STEADY_ARMS = "steady_arms"
 SUPPORTS = "supports"
 ANCHORS = "anchors"
-
+# A dropper is modelled as vertical; more lean along the track than this is a wrong mesh [m].
+_LEAN_LIMIT = 0.5
 
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -171,13 +172,6 @@ def elements_of(nodes: np.ndarray, breaks: np.ndarray = _NONE) -> np.ndarray:
     return np.delete(pairs, breaks - 1, axis=0) if breaks.size else pairs
 
 
-# Nodes closer than this are taken for one place [m].
-_SAME_PLACE = 1e-6
-
-# A dropper is modelled as vertical; more lean along the track than this is a wrong mesh [m].
-_LEAN_LIMIT = 0.5
-
-
 @dataclass(frozen=True)
 class Joins:
     """A group of droppers: its name and the wires that it joins."""
@@ -207,7 +201,7 @@ class Names:
     clamps: tuple[tuple[str, str, tuple[float, ...]], ...] = ()
 
 
-SIMPLE = Names(
+SIMPLE_NAMES = Names(
     {CONTACT_WIRE: (True, True), MESSENGER_WIRE: (True, True)},
     (Joins(DROPPERS, MESSENGER_WIRE, CONTACT_WIRE),),
     {STEADY_ARMS: CONTACT_WIRE},
@@ -326,7 +320,7 @@ def _order_wire(
         joined, np.column_stack([neighbours, neighbours + 1])
     ):
         raise InputError(_why_no_chain(points, used, degree, n_pieces, what))
-    level = np.flatnonzero(np.diff(points[nodes, 0]) < _SAME_PLACE)
+    level = np.flatnonzero(np.diff(points[nodes, 0]) < SAME_PLACE)
     if level.size:
         raise InputError(
             f"{what} does not advance along the track at {_at(points, nodes[level[0]])}"
@@ -355,7 +349,7 @@ def _why_no_chain(
 
 def _check_lengths(points: np.ndarray, edges: np.ndarray, what: str) -> None:
     length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
-    short = np.flatnonzero(length < _SAME_PLACE)
+    short = np.flatnonzero(length < SAME_PLACE)
     if short.size:
         place = _at(points, edges[short[0], 0])
         raise InputError(f"{what} has an element of zero length at {place}")
@@ -429,7 +423,7 @@ def _ends_of_chains(
 def _check_droppers(points: np.ndarray, ends: np.ndarray, joins: Joins, what: str) -> None:
     """Refuse droppers that stand upside down, lean too far or lie on one another."""
     across = points[ends[:, 0]] - points[ends[:, 1]]
-    inverted = np.flatnonzero(across[:, 2] < _SAME_PLACE)
+    inverted = np.flatnonzero(across[:, 2] < SAME_PLACE)
     if inverted.size:
         raise InputError(
             f"{what}: the dropper at {_at(points, ends[inverted[0], 1])} does not hang down: its "

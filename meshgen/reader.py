@@ -13,7 +13,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.files import is_file
-from catenary.meshgen.mesh import ANCHORS, SIMPLE, Groups, LineMesh, Names, assemble
+from catenary.meshgen.mesh import ANCHORS, SIMPLE_NAMES, Groups, LineMesh, Names, assemble
 
 # A mesh of four million nodes takes half of it.
 MOST_BYTES = 500_000_000
@@ -22,7 +22,7 @@ _SHOWN, _SOME = 60, 12  # of the names of groups that a file has
 _KINDS = {0: "points", 1: "lines", 2: "surfaces", 3: "volumes"}
 
 
-def read_mesh(path: Path, names: Names = SIMPLE) -> LineMesh:
+def read_mesh(path: Path, names: Names = SIMPLE_NAMES) -> LineMesh:
     """The line mesh of a ``.msh`` file (MSH 2.2 or 4.1), checked. Not collective: one rank reads.
 
     Numbering and orientation of nodes and elements in the file do not matter; a dropper may

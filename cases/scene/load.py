@@ -174,7 +174,7 @@ def load_scene(
 
 
 def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:
-    """The checked scene of a nested table, such as ``problem.resolved`` gives.
+    """The checked scene of a nested table, such as ``scene.resolved`` gives.
 
     ``raw`` are the tables, ``origin`` the places where keys were written, for messages. ``folder``
     is the base of a relative ``mesh.file`` in the case file (on the command line it is the working

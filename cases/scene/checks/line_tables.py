@@ -29,11 +29,21 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import FREE, make_line, registered
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, FreeDroppers, LineData
-from catenary.meshgen.wires import End, Wire
+from catenary.meshgen.wires import SAME_PLACE, End, Wire
 from catenary.solver.problem.ends import AlongTrack
+from catenary.solver.problem.problem import Problem
 
 # Keys of ``line`` that come with a part of a topology.
 _WITH = {"messenger_wire": ("encumbrance_m",)}
+_SIDES = ("start", "end")
+_ACROSS, _ALONG = "lateral_motion", "axial_motion"
+# A place is at a mast if it is nearer than this [m].
+_AT_MAST = 1e-3
+_ARM = "line.steady_arm"
+# Weights fit a tension if they differ by a smaller share.
+_FITS = 1e-6
+# The last span and the one that is repeated.
+_LAST = 2
 
 
 def check_topology(scene: Scene) -> Iterator[Fault]:
@@ -214,9 +224,6 @@ def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
         return
 
 
-_ACROSS = "lateral_motion"
-
-
 def check_lateral(scene: Scene) -> Iterator[Fault]:
     """Keys of lateral motion without it."""
     line = scene.line
@@ -233,16 +240,6 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
     for key, value in given.items():
         if value is not None and _ACROSS not in scene.effects:
             yield scene.needs_effect(key, _ACROSS)
-
-
-_ALONG = "axial_motion"
-_GRAVITY = 9.81
-# A place is at a mast if it is nearer than this [m].
-_AT_MAST = 1e-3
-_SIDES = ("start", "end")
-_ARM = "line.steady_arm"
-# Weights fit a tension if they differ by a smaller share.
-_FITS = 1e-6
 
 
 def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -408,9 +405,9 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
             yield scene.refused(key, why + take_away())
             continue
         tension = wires[name].tension
-        low, high = tensioner.band(name, wires[name], _GRAVITY)
+        low, high = tensioner.band(name, wires[name], Problem.gravity)
         if not low * (1 - _FITS) <= tension <= high * (1 + _FITS):
-            fits = tension / (tensioner.ratio * _GRAVITY)
+            fits = tension / (tensioner.ratio * Problem.gravity)
             holds = f"{low:g} N" if low == high else f"{low:g} to {high:g} N"
             yield scene.refused(
                 key,
@@ -446,12 +443,6 @@ def _elsewhere(scene: Scene) -> Iterator[Fault]:
         )
 
 
-# Lengths of spans that differ by less are one [m].
-_TINY = 1e-6
-# The last span and the one that is repeated.
-_LAST = 2
-
-
 def check_ends(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Ends that cannot be."""
     yield from _layers(scene, line)
@@ -484,7 +475,7 @@ def _goes_on(scene: Scene, line: LineData, side: str) -> Iterator[Fault]:
         yield refused(f"it needs {_LAST + 1} spans (line.n_spans) at least, not {n}")
         return
     lengths = line.span_lengths[:_LAST] if side == "start" else line.span_lengths[-_LAST:]
-    if abs(lengths[0] - lengths[1]) > _TINY:
+    if abs(lengths[0] - lengths[1]) > SAME_PLACE:
         yield refused(
             f"the two spans there must have one length (line.span_m), not {lengths[0]:g} and "
             f"{lengths[1]:g} m"

@@ -29,13 +29,16 @@ from catenary.cases.scene.train.pantograph import (
 )
 from catenary.cases.scene.train.train import MotionTable, vehicle_of
 from catenary.mbs.rigid.bodies import SPACE
+from catenary.mbs.vehicle import BaseMotion
 from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:
-    from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
+    from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, Standing
 
 # A wave of an irregular track takes at least so many steps.
 STEPS_PER_WAVE = 8
+# By how much the arm may be further down than the head while both fall [m].
+_LEADS = 0.05
 # Slack for sums of decimal lengths [m] and times [s].
 _TINY = 1e-6
 
@@ -111,10 +114,7 @@ def _multibody_strips(scene: Scene) -> Iterator[Fault]:
     for name, kind in _kinds(scene).items():
         if not isinstance(kind, MultibodyTable) or kind.strips.mass_kg is None:
             continue
-        from catenary.mbs.mechanism.multibody_pantograph import stand
-
-        data = pantograph_of(name, kind, scene.train.speed_km_h)
-        mass = stand(data).head.mass  # type: ignore[arg-type]
+        mass = _standing(scene, name, kind)[1].head.mass
         if kind.strips.mass >= mass:
             yield scene.refused(
                 f"pantographs.{name}.strips.mass_kg",
@@ -128,7 +128,7 @@ def _tables_reach(scene: Scene) -> Iterator[Fault]:
         return
     start, end = scene.train.start_m, end_of(scene)
     rear = scene.train.pantographs[-1].behind_m
-    duration = (end - start) / (scene.train.speed_km_h / 3.6)
+    duration = (end - start) / speed_from_km_h(scene.train.speed_km_h)
     for direction in ("vertical", "lateral"):
         table: MotionTable | None = getattr(scene.vehicle, direction)
         if table is None:
@@ -151,7 +151,7 @@ def _tables_reach(scene: Scene) -> Iterator[Fault]:
 def _waves(scene: Scene) -> Iterator[Fault]:
     if scene.vehicle is None or scene.vehicle.irregularity is None:
         return
-    step = scene.train.speed_km_h / 3.6 * scene.numerics.dt_s
+    step = speed_from_km_h(scene.train.speed_km_h) * scene.numerics.dt_s
     shortest = scene.vehicle.irregularity.shortest_m
     if shortest < STEPS_PER_WAVE * step:
         yield scene.refused(
@@ -183,14 +183,12 @@ def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
 def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
     """Farthest place of the wire from the middle of a pantograph's strips on its run, and the
     pantograph's place then [m]."""
-    place, speed = scene.train.pantographs[number], scene.train.speed_km_h / 3.6
+    place, speed = scene.train.pantographs[number], speed_from_km_h(scene.train.speed_km_h)
     start = scene.train.start_m - place.behind_m
     duration = (end_of(scene) - scene.train.start_m) / speed
     offsets = np.array([1.0, -1.0]) * strips_ahead(scene)[number]
     base = None
     if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
-        from catenary.mbs.vehicle import BaseMotion
-
         vehicle = vehicle_of(scene.vehicle)
         if not scene.switches()["vehicle_suspension"]:
             vehicle = replace(vehicle, suspension=None)
@@ -215,10 +213,6 @@ def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
         return 0.0, start
     strip = int(np.argmax(np.abs(places[first])))
     return float(places[first, strip]), float(start + speed * times[first])
-
-
-# By how much the arm may be further down than the head while both fall [m].
-_LEADS = 0.05
 
 
 def check_pantographs(scene: Scene) -> Iterator[Fault]:
@@ -252,9 +246,9 @@ def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
     for name, table in _kinds(scene).items():
         if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
             continue
-        data, working = _standing(scene, name, table)
+        data, standing = _standing(scene, name, table)
         for height in heights:
-            if _reaches(data, working + height - table.nominal_height_m):
+            if _reaches(data, standing.working_height + height - table.nominal_height_m):
                 continue
             yield scene.refused(
                 f"pantographs.{name}.nominal_height_m",
@@ -272,17 +266,17 @@ def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
         return True
     lowest = line.lowest_contact
     nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
-    data, working = _standing(scene, name, table)
-    return _reaches(data, working + lowest - nominal - drop - _LEADS)
+    data, standing = _standing(scene, name, table)
+    return _reaches(data, standing.working_height + lowest - nominal - drop - _LEADS)
 
 
-def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, float]:
-    """A mechanism and the height of its arm above its base where it stands [m]."""
+def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, Standing]:
+    """A mechanism, and how it stands."""
     from catenary.cases.scene.train.multibody import multibody_of
     from catenary.mbs.mechanism.multibody_pantograph import stand
 
     data = multibody_of(name, table, scene.train.speed_km_h)
-    return data, stand(data).working_height
+    return data, stand(data)
 
 
 def _reaches(data: MultibodyData, arm: float) -> bool:
