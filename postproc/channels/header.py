@@ -19,8 +19,8 @@ from catenary.meshgen.wires import Role
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
+    from catenary.solver.model.rest_shape import Equilibrium
     from catenary.solver.statics.elasticity import Elasticity
-    from catenary.solver.statics.form_finding import Equilibrium
 
 
 @dataclass(frozen=True)

@@ -295,7 +295,7 @@ class Pantographs:
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what ``heads_in_loop`` depend on in steps to ``times`` [s].
 
-        ``drives`` (len(times), n, `drives.drive_width`).
+        ``drives`` (len(times), n, `interface.drive_width`).
         """
         named(drives)["time"] = times[:, None]
         for number, model in enumerate(self.models):

@@ -13,13 +13,11 @@ from catenary.solver.model.link_directions import between_nodes, dropper_directi
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, Bends, Direction, Links, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Hanging, Model, wire_elements
-from catenary.solver.model.unknowns import SAME_STATION
+from catenary.solver.model.unknowns import LEVEL, SAME_STATION, UPRIGHT
 from catenary.solver.problem.problem import Problem
 
 # Displacements of a node beside its height, in which its masses move as well.
-_LEVEL = ("u", "v")
-# Unknowns of a wire in the lateral plane.
-_LATERAL = ("v", "theta_z")
+_BESIDE = ("u", "v")
 
 
 class ModelBuilder:
@@ -37,7 +35,7 @@ class ModelBuilder:
         self._constrained: list[np.ndarray] = []
         self._n_terms = 0
 
-    def add_wire(self, wire: str, unknowns: tuple[str, str] = ("w", "theta_y")) -> None:
+    def add_wire(self, wire: str, unknowns: tuple[str, str] = UPRIGHT) -> None:
         """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
         if self._before is not None:
             number = len(self.model.blocks)
@@ -54,7 +52,7 @@ class ModelBuilder:
         mass = beam.mass(length, data.mass_per_length * section)
         stiffness = beam.stiffness(length, data.bending_stiffness * bending, tension)
         load = (data.mass_per_length * section)[:, None] * beam.uniform_load(length)
-        lateral = tuple(unknowns) == _LATERAL
+        lateral = tuple(unknowns) == LEVEL
         self.add_block(Block(wire, dofs, kind, mass, stiffness, of_shape=True, lateral=lateral))
         if unknowns[0] == "w":
             self._hang(len(self.model.blocks) - 1, load)
@@ -94,7 +92,7 @@ class ModelBuilder:
         values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)
         self.add_elements(component, dofs[:, None], mass=values[:, None, None])
-        for name in _LEVEL if unknown == "w" else ():
+        for name in _BESIDE if unknown == "w" else ():
             there = self.model.numbering.has(nodes, name)
             if there.any():
                 self.add_masses(component, nodes[there], values[there], unknown=name)

@@ -17,6 +17,12 @@ from catenary.solver.model.model import Block, Model
 if TYPE_CHECKING:
     from catenary.base.petsc import PETSc
 
+# Rows whose entries are put together at once, some 50 MB of them.
+_STRETCH = 2**16
+# Unknowns whose bands are put together at once, some ninety spans of two wires: entries of a
+# hundred elements take nearly as long as those of a thousand.
+_AT_ONCE = 2**14
+
 
 def iterate_entries(
     model: Model,
@@ -103,10 +109,6 @@ def _kept(model: Model, dofs: np.ndarray, first: int, last: int) -> np.ndarray |
     moves = free[dofs - low]
     mine = moves if inside else moves & (dofs >= first) & (dofs < last)
     return np.asarray(mine[:, :, None] & moves[:, None, :])
-
-
-# Rows whose entries are put together at once, some 50 MB of them.
-_STRETCH = 2**16
 
 
 def whole_matrix(
@@ -209,7 +211,7 @@ def as_petsc(part: sparse.bsr_matrix, comm: Any) -> PETSc.Mat:
     return matrix
 
 
-def columns_of(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
+def coupled_with(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
     """Range of unknowns that M, K and C couple with those of ``rows``. Not collective."""
     low, high = rows
     for block in model.blocks:
@@ -218,11 +220,6 @@ def columns_of(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
             low = min(low, int(block.dofs[near].min()))
             high = max(high, int(block.dofs[near].max()) + 1)
     return low, high
-
-
-# Unknowns whose bands are put together at once, some ninety spans of two wires: entries of a
-# hundred elements take nearly as long as those of a thousand.
-_AT_ONCE = 2**14
 
 
 class OperatorBands:

@@ -20,7 +20,7 @@ from catenary.solver.model.alike import alike
 from catenary.solver.model.links import NO_DROPPERS, Links
 from catenary.solver.model.loads import Load
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.unknowns import Unknowns
+from catenary.solver.model.unknowns import UPRIGHT, Unknowns
 from catenary.solver.problem.problem import Problem, Simulated
 
 # Elements of a block that are looked for together: the ends of each are as long as its unknowns.
@@ -287,7 +287,7 @@ class Model:
 
     def wire_elements(self, wire: str) -> tuple[np.ndarray, np.ndarray]:
         """Element unknowns (n, 4) in the vertical plane and lengths (n,) [m] of a wire."""
-        return wire_elements(self, wire, ("w", "theta_y"))
+        return wire_elements(self, wire, UPRIGHT)
 
     @property
     def contact_x(self) -> np.ndarray:

@@ -45,8 +45,7 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows, reach
 from catenary.solver.model import beam
-from catenary.solver.model.axial_motion import tensioned_ends
-from catenary.solver.model.links import Direction
+from catenary.solver.model.axial_motion import shape_of, tensioned_ends
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import OperatorBands, iterate_entries, whole_matrix
 from catenary.solver.model.model import Model, wire_elements
@@ -110,11 +109,11 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
             continue
         for plane, course, slope in form.planes():
             dofs, length = wire_elements(first, wire.name, plane)
-            shape = np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
+            shape = shape_of(course, slope, pairs)
             pull = np.einsum("nij,nj->ni", beam.stiffness(length, 0.0, lost), shape)
             np.add.at(load, dofs, -pull)
             energy += 0.5 * float((shape * pull).sum())
-    unknowns, weights = _droppers(model, broken)
+    unknowns, weights = (part[broken] for part in model.droppers.direction)
     np.add.at(load, unknowns, form.dropper_force[broken, None] * weights)
     stored = first.dropper_slopes.energy_under(form.dropper_force)
     # One that was slack at rest held the energy of what it keeps of its stiffness.
@@ -122,8 +121,11 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     stored[keeps] /= first.simulated.kept_ratio
     energy -= float(stored[broken].sum())
     if effects.needs_form(problem):
-        model, form, load = _about_rest(first, model, form)
-        _break_unstable(model)
+        try:
+            model, form, load = _about_rest(first, model, form)
+            refuse_unstable(model)
+        except InputError as error:
+            raise RunBroken(f"after an incident {error}") from None
     load[model.constrained] = 0.0
     unbalanced = np.flatnonzero(load)
     if unbalanced.size:
@@ -138,10 +140,7 @@ def _about_rest(
     droppers have there, and its load (n_dofs,)."""
     potential = Potential(first, changed, form, form.dropper_length)
     loads = dead_loads(changed) - dead_loads(first)
-    try:
-        rest = RestNearby(potential, loads, ends_stay=True).find()
-    except InputError as error:
-        raise RunBroken(f"after an incident {error}") from None
+    rest = RestNearby(potential, loads, ends_stay=True).find()
     about = rest.form
     if changed.simulated.tensioner is not None and about.along.size:
         # Stops are where they were: displacements count from the first rest.
@@ -161,13 +160,6 @@ def _about_rest(
     there = ChangedLine(model, now, load, 0.0)
     push = _compensation(there, moved, np.zeros(moved.size))
     return model, now, load - push
-
-
-def _break_unstable(model: Model) -> None:
-    try:
-        refuse_unstable(model)
-    except InputError as error:
-        raise RunBroken(f"after an incident {error}") from None
 
 
 def acceleration_jump(
@@ -225,12 +217,6 @@ def _compensation(line: ChangedLine, displacement: np.ndarray, velocity: np.ndar
     total = np.zeros(line.model.n_dofs)
     np.add.at(total, unknowns[acts], (law["released"] * reserve)[acts, None] * weights[acts])
     return total
-
-
-def _droppers(model: Model, which: np.ndarray) -> Direction:
-    """Directions of some of the droppers, ``which`` (n_droppers,) bool."""
-    unknowns, weights = model.droppers.direction
-    return Direction(unknowns[which], weights[which])
 
 
 def _times(

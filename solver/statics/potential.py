@@ -21,12 +21,19 @@ import numpy as np
 from catenary.meshgen.line import SteadyArm
 from catenary.meshgen.wires import Wire
 from catenary.solver.model import beam
-from catenary.solver.model.axial_motion import curve_rows, rows_in_curve, shape_of
+from catenary.solver.model.axial_motion import (
+    curve_rows,
+    rows_in_curve,
+    shape_of,
+    slope_rows,
+)
 from catenary.solver.model.model import Model, wire_elements
 from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.wind import mean_load
 
-_LEVEL = ("v", "theta_z")
+# Components of a dropper's vector and of an arm's.
+_DROPPER, _ARM = ("u", "v", "w"), ("v", "w", "u")
 
 
 def dead_loads(model: Model) -> np.ndarray:
@@ -45,12 +52,12 @@ def dead_loads(model: Model) -> np.ndarray:
     if line.curve is not None:
         every = np.arange(model.mesh.n_nodes)
         share = line.curve.sideways_pull_at(model.mesh.x(every))
-        for sideways, own in zip(_LEVEL, ("w", "theta_y"), strict=True):
+        for sideways, own in zip(LEVEL, UPRIGHT, strict=True):
             load[model.dofs(every, sideways)] -= share * weight[model.dofs(every, own)]
     if wind is None:
         return load
     for wire in line.wires:
-        dofs, length = wire_elements(model, wire.name, _LEVEL)
+        dofs, length = wire_elements(model, wire.name, LEVEL)
         middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
         pull = mean_load(wind, model.problem.tunnels, wire, middle)
         np.add.at(load, dofs, pull[:, None] * beam.uniform_load(length))
@@ -72,7 +79,7 @@ def curve_load(model: Model, form: Equilibrium | None) -> np.ndarray:
         return load
     for wire in model.problem.line.wires:
         upright, length = model.wire_elements(wire.name)
-        level, _ = wire_elements(model, wire.name, _LEVEL)
+        level, _ = wire_elements(model, wire.name, LEVEL)
         middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
         pull = wire.tension_at(middle) * length
         for dofs, rows in zip((upright, level), curve_rows(model, wire.name, form), strict=True):
@@ -98,13 +105,9 @@ def exact_moments(model: Model) -> np.ndarray:
             pull = curve.upright_curvature_at(middle) * tension
             np.add.at(load, dofs, pull[:, None] * moments)
             pull = curve.sideways_pull_at(middle) * weight + curve.curvature_at(middle) * tension
-            sideways, _ = wire_elements(model, wire.name, _LEVEL)
+            sideways, _ = wire_elements(model, wire.name, LEVEL)
             np.add.at(load, sideways, pull[:, None] * moments)
     return load
-
-
-# Components of a dropper's vector and of an arm's.
-_DROPPER, _ARM = ("u", "v", "w"), ("v", "w", "u")
 
 
 class Potential:
@@ -255,7 +258,7 @@ class _Wire:
         curved = self._in_curve(0.5 * moved)
         for number, (dofs, shape) in enumerate(self._planes):
             bent = moved[dofs]
-            rows = self._slope_rows(shape + 0.5 * bent) + curved[number]
+            rows = slope_rows(self._length, shape + 0.5 * bent, self._taut) + curved[number]
             strain += (rows * bent).sum(axis=1)
         return np.asarray(self._had + self._axial * strain)
 
@@ -273,7 +276,9 @@ class _Wire:
             if self._other_bending is not None:
                 pull += np.einsum("nij,nj->ni", self._other_bending, shape)
             if other.any():
-                pull += other[:, None] * (self._slope_rows(shape) + self._curved[number])
+                pull += other[:, None] * (
+                    slope_rows(self._length, shape, self._taut) + self._curved[number]
+                )
             if gained.any():
                 pull += gained[:, None] * np.einsum("nij,nj->ni", self._taut, bent)
             # Where the track twists each plane sees what has moved in the other one.
@@ -281,13 +286,8 @@ class _Wire:
             pull += taut[:, None] * (curved[number] - self._curved[number])
             np.add.at(total, dofs, pull)
 
-    def _slope_rows(self, shape: np.ndarray) -> np.ndarray:
-        """Derivatives of the mean strain by the unknowns of a plane in a shape, (n, 4), on straight
-        track."""
-        return np.asarray(np.einsum("nij,nj->ni", self._taut, shape) / self._length[:, None])
-
     def _in_curve(self, moved: np.ndarray) -> tuple[np.ndarray, ...]:
-        """What a curve adds to them in each plane, (n, 4); nothing without lateral motion."""
+        """What a curve adds to ``slope_rows`` in each plane, (n, 4); zero in one plane."""
         if len(self._planes) == 1:
             return (np.zeros((len(self._ends), 4)),)
         shapes = (shape + moved[dofs] for dofs, shape in self._planes)

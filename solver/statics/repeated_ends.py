@@ -27,8 +27,17 @@ from catenary.solver.problem.ends import Fixed
 from catenary.solver.problem.problem import Problem
 
 # Change from turn to turn of a line that is settled [m]; one that is round-off of its rest if it
-# falls no more, as of slack lines whose rest is found less exactly; and the most turns.
-_SETTLED, _ROUND_OFF, _MOST_TURNS = 1e-14, 1e-11, 40
+# falls no more, as of slack lines whose rest is found less exactly.
+_SETTLED, _ROUND_OFF = 1e-14, 1e-11
+# Change of ends from turn to turn that are settled [m], and one that is round-off of rests which
+# Newton's method finds to 1e-9 m, if it falls no more.
+_MOVES_SETTLED, _MOVES_ROUND_OFF = 1e-12, 1e-8
+# Turns at most.
+MOST_TURNS = 40
+# Loads that are nothing, over the largest: round-off of droppers of 1e6 N/m.
+_NOTHING = 1e-6
+# Unknowns of each plane, and which mast before the end moves as it does: 0 is the last one.
+_FOLLOWED = {"w": 0, "theta_y": 0, "v": 1, "theta_z": 1}
 
 
 class RepeatedEnds(NamedTuple):
@@ -77,7 +86,7 @@ def settled(turn: Callable[[np.ndarray], np.ndarray], first: np.ndarray) -> np.n
         If they do not settle.
     """
     values, before = first, np.inf
-    for _ in range(_MOST_TURNS):
+    for _ in range(MOST_TURNS):
         found = turn(values)
         change = np.abs(found - values).max(initial=0.0)
         values = found
@@ -85,19 +94,15 @@ def settled(turn: Callable[[np.ndarray], np.ndarray], first: np.ndarray) -> np.n
         if change < _SETTLED * scale or before <= change < _ROUND_OFF * scale:
             return values
         before = change
-    raise InputError(
+    raise unsettled(change)
+
+
+def unsettled(change: float) -> InputError:
+    """The error of a line whose end changes [m] by as much from turn to turn."""
+    return InputError(
         "the line at rest does not settle where line.ends says that it is periodic: its end still "
         f"moves by {1e3 * change:.2g} mm when it hangs as the span before does; end it otherwise"
     )
-
-
-# Loads that are nothing, over the largest: round-off of droppers of 1e6 N/m.
-_NOTHING = 1e-6
-# Change of ends from turn to turn that are settled [m], and one that is round-off of rests which
-# Newton's method finds to 1e-9 m, if it falls no more.
-_MOVES_SETTLED, _MOVES_ROUND_OFF = 1e-12, 1e-8
-# Unknowns of each plane, and which mast before the end moves as it does: 0 is the last one.
-_FOLLOWED = {"w": 0, "theta_y": 0, "v": 1, "theta_z": 1}
 
 
 class EndsThatFollow(NamedTuple):

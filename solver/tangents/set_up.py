@@ -2,7 +2,7 @@
 
 A march depends on a parameter through its set-up only: matrices and links of the line, the wires'
 shape at rest, heads, contact law, train. These are differentiated here by central differences of
-set-ups, which cost no march; `tangent_steps` takes the derivatives through the march without a
+set-ups, which cost no march; `tangents.march` takes the derivatives through the march without a
 further approximation.
 """
 

@@ -24,10 +24,10 @@ from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.beam import shape_slopes, shape_values
 from catenary.solver.model.matrices import iterate_entries
 from catenary.solver.model.model import Model
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import some_of, switching_links
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
-from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.wind import airflow
 
 
