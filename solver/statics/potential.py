@@ -128,7 +128,12 @@ class Potential:
         if not model.simulated.lateral:
             self._parts = [k for k in self._parts if _DROPPER[k] != "v"]
         self._droppers_were = self._pulls(known, known.dropper_force)
-        self._arms = _arms(model, known)
+        kinds = [] if known.lateral is None else model.problem.line.steady_arms
+        self._arms = [
+            _Arms(model, known, number, arms.kind)
+            for number, arms in enumerate(kinds)
+            if arms.kind.length > 0.0
+        ]
 
     def reserve(self, form: Equilibrium) -> np.ndarray:
         """Forces of droppers if they could push, (n_droppers,) [N]."""
@@ -328,12 +333,3 @@ class _Arms:
         """On the wire: lateral, upward, and along the track, (n, 3) [N]."""
         tension, unit = self.tension(moved)
         return np.asarray(tension[:, None] * unit)
-
-
-def _arms(model: Model, known: Equilibrium) -> list[_Arms]:
-    if known.lateral is None:
-        return []
-    kinds = [arms.kind for arms in model.problem.line.steady_arms]
-    return [
-        _Arms(model, known, number, kind) for number, kind in enumerate(kinds) if kind.length > 0.0
-    ]

@@ -17,7 +17,7 @@ from scipy import sparse
 
 from catenary.base.errors import InputError
 from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.interface import N_DRIVE, drive_width, named
+from catenary.mbs.interface import N_DRIVE, drive_width, drives_by_name
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
@@ -266,7 +266,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
             if models[0].steps_as(models[1]):
                 # A base elsewhere is a base that is raised.
                 lower, upper = (np.array(model.base_height) for model in models)
-                named(drives[:, number])["base"] += derivative(lower, upper, step)
+                drives_by_name(drives[:, number])["base"] += derivative(lower, upper, step)
                 models = []
             beside = [model.stepped for model in models]
             return native.HeadChange(*_NO_STEP, state, beside, step)

@@ -104,7 +104,7 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     if line.n_spans < 2:
         yield scene.refused("line.n_spans", "a stitched line needs a support, that is two spans")
         return
-    yield from _length(scene, line, key, stitch.length)
+    yield from _too_long(scene, line, key, stitch.length)
     clamps = line.around_supports(stitch.length).ravel()
     apart = _to_nearest(clamps, line.dropper_x)
     if apart.min() < SHORTEST_GAP:
@@ -114,7 +114,7 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     if nearest > 0.5 * stitch.length:
         why = f"no dropper would hang from it: the nearest one is {nearest:g} m from a support"
         yield scene.refused(key, why)
-    yield from _tension(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
+    yield from _takes_all(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
 
 
 def _to_nearest(x: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -125,18 +125,20 @@ def _to_nearest(x: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 def _bridle(scene: Scene, line: LineData) -> Iterator[Fault]:
     if line.bridle is not None:
-        yield from _length(scene, line, "line.bridle.length_m", line.bridle.length)
+        yield from _too_long(scene, line, "line.bridle.length_m", line.bridle.length)
         tensions = line.bridle.conductor.tension, line.contact_wire.tension
-        yield from _tension(scene, "bridle", tensions[0], "contact_wire", tensions[1])
+        yield from _takes_all(scene, "bridle", tensions[0], "contact_wire", tensions[1])
 
 
-def _length(scene: Scene, line: LineData, key: str, length: float) -> Iterator[Fault]:
+def _too_long(scene: Scene, line: LineData, key: str, length: float) -> Iterator[Fault]:
     shortest = min(line.span_lengths)
     if length >= shortest:
         yield scene.refused(key, f"it must be less than the shortest span ({shortest:g} m)")
 
 
-def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float) -> Iterator[Fault]:
+def _takes_all(
+    scene: Scene, wire: str, tension: float, bearer: str, whole: float
+) -> Iterator[Fault]:
     """A wire between clamps that would take all tension of the one that it is clamped to."""
     if tension >= whole:
         yield scene.refused(
@@ -253,11 +255,11 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
     if not scene.origin.recorded:
         yield from _idle_tensioners(scene)
     if on:
-        yield from _wires(scene)
-        yield from _arms(scene, line)
-        yield from _held(scene, line)
-        yield from _held_free(scene, line)
-        yield from _elsewhere(scene)
+        yield from _without_stiffness(scene)
+        yield from _without_length(scene, line)
+        yield from _loose_sections(scene, line)
+        yield from _loose_wires(scene, line)
+        yield from _excluded(scene)
 
 
 def _data_of_effect(scene: Scene) -> list[str]:
@@ -305,7 +307,7 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
         yield scene.refused("line.tensioner.stop_stiffness_N_per_m", why)
 
 
-def _wires(scene: Scene) -> Iterator[Fault]:
+def _without_stiffness(scene: Scene) -> Iterator[Fault]:
     for key, wire in wire_tables(scene.line).items():
         if wire.stiffness_along() is None:
             field = LineTable.model_fields.get(key.removeprefix("line."))
@@ -317,7 +319,7 @@ def _wires(scene: Scene) -> Iterator[Fault]:
             )
 
 
-def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
+def _without_length(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Arms without a length, along which nothing could swing."""
     made = make_line(line)
     keys = {getattr(table, "name", ""): key for key, table in arm_tables(scene.line).items()}
@@ -331,7 +333,7 @@ def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
             return
 
 
-def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
+def _loose_sections(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Sections with a tensioner at both ends and nothing in between that holds their wires."""
     along, masts, overlaps = along_of(scene.line), line.support_positions, line.overlaps
     sections = [[0.0, float(masts[-1])]]
@@ -350,7 +352,7 @@ def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
             )
 
 
-def _held_free(scene: Scene, line: LineData) -> Iterator[Fault]:
+def _loose_wires(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Free wires with tensioners of their own at both ends and nothing in between."""
     along = along_of(scene.line)
     of_line = {"start": along.start, "end": along.end}
@@ -426,7 +428,7 @@ def _has_tensioner(wire: Wire, along: AlongTrack, line: LineData) -> bool:
     )
 
 
-def _elsewhere(scene: Scene) -> Iterator[Fault]:
+def _excluded(scene: Scene) -> Iterator[Fault]:
     """Ends and windows that exclude motion along the track."""
     for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
         if end.kind == "periodic":

@@ -237,10 +237,10 @@ def check_mechanisms(scene: Scene, line: LineData) -> Iterator[Fault]:
                 _standing(scene, name, table)
             except (InputError, RunBroken) as error:
                 found.append(scene.fault(f"pantographs.{name}", f"cannot be built: {error}"))
-    yield from found or _heights(scene, line)
+    yield from found or _out_of_reach(scene, line)
 
 
-def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
+def _out_of_reach(scene: Scene, line: LineData) -> Iterator[Fault]:
     lowest = line.lowest_contact
     heights = lowest, line.contact_height
     for name, table in _kinds(scene).items():
