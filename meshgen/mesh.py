@@ -89,6 +89,10 @@ class LineMesh:
         """First and second node of the elements of a wire, (n, 2), in order of x."""
         return elements_of(self.wires[wire], self.breaks.get(wire, _NONE))
 
+    def middles(self, wire: str) -> np.ndarray:
+        """Middle of each element of a wire along the track, (n,) [m]."""
+        return np.asarray(self.x(self.elements(wire)).mean(axis=1))
+
     def pieces(self, wire: str) -> list[np.ndarray]:
         """Nodes of the pieces of a wire, in order of x."""
         return np.split(self.wires[wire], self.breaks.get(wire, _NONE))

@@ -39,7 +39,7 @@ from catenary.solver.kernels import native
 from catenary.solver.model import beam
 from catenary.solver.model.alike import alike
 from catenary.solver.model.loads import FieldLoad
-from catenary.solver.model.model import Block, Model, wire_elements
+from catenary.solver.model.model import Block, Model
 from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.problem.problem import Placement, Problem, Simulated
 from catenary.solver.problem.wind import Wind
@@ -361,7 +361,7 @@ def forces_along(
     points : ndarray, shape (n_points,), optional
         Ascending places [m]; the wire's nodes if not given.
     """
-    dofs, length = wire_elements(model, wire, unknowns)
+    dofs, length = model.wire_elements(wire, unknowns)
     nodes = model.mesh.wires[wire]
     number = np.empty(model.mesh.n_nodes, dtype=np.int64)
     number[nodes] = np.arange(nodes.size)
@@ -403,8 +403,8 @@ def damping_blocks(model: Model, wind: Wind) -> list[Block]:
     tunnels, found = model.problem.tunnels, []
     for wire in model.problem.line.wires:
         for plane in planes_of(model, wire.name):
-            dofs, length = wire_elements(model, wire.name, plane)
-            middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+            dofs, length = model.wire_elements(wire.name, plane)
+            middle = model.mesh.middles(wire.name)
             speed = np.abs(across_at(wind, tunnels, middle))
             share = 1.0 if plane is LEVEL else 0.5
             rate = share * wind.density * drag_width(wire) * speed

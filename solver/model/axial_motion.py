@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.meshgen.line import Curve
+from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import End
 from catenary.solver.model import beam
-from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.unknowns import LEVEL, SAME_STATION, UPRIGHT
 
@@ -33,7 +34,7 @@ def unknowns_along(model: Model, wire: str) -> np.ndarray:
     vertical plane, (n, 6), and in the lateral one where it is simulated, (n, 10)."""
     parts = [model.dofs(model.mesh.elements(wire), "u")]
     for plane in (UPRIGHT, LEVEL) if model.simulated.lateral else (UPRIGHT,):
-        parts.append(wire_elements(model, wire, plane)[0])
+        parts.append(model.wire_elements(wire, plane)[0])
     return np.concatenate(parts, axis=1)
 
 
@@ -121,6 +122,10 @@ class WireEnd(NamedTuple):
     tensioned: bool
     outwards: int
 
+    def element(self, mesh: LineMesh) -> int:
+        """Number of the wire's element that ends there."""
+        return int(np.flatnonzero((mesh.elements(self.wire) == self.node).any(axis=1))[0])
+
 
 def ends_of(model: Model) -> list[WireEnd]:
     """Ends of all wires, without ends that clamps carry, wire by wire in order of x."""
@@ -179,5 +184,4 @@ def mid_points(model: Model) -> np.ndarray:
 
 def tension_at_rest(model: Model, end: WireEnd) -> float:
     """Tension of a wire in its last element before an end, at rest [N]."""
-    element = np.flatnonzero((model.mesh.elements(end.wire) == end.node).any(axis=1))[0]
-    return float(model.tension_of(end.wire)[element])
+    return float(model.tension_of(end.wire)[end.element(model.mesh)])

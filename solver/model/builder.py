@@ -12,7 +12,7 @@ from catenary.solver.model.alike import alike
 from catenary.solver.model.link_directions import between_nodes, dropper_directions
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, Bends, Direction, Links, law
 from catenary.solver.model.loads import Load
-from catenary.solver.model.model import Block, Hanging, Model, wire_elements
+from catenary.solver.model.model import Block, Hanging, Model
 from catenary.solver.model.unknowns import LEVEL, SAME_STATION, UPRIGHT
 from catenary.solver.problem.problem import Problem
 
@@ -43,7 +43,7 @@ class ModelBuilder:
             if number in self._before.hanging_wires:
                 self._hang(number, self._before.hanging_wires[number])
             return
-        dofs, length = wire_elements(self.model, wire, unknowns)
+        dofs, length = self.model.wire_elements(wire, unknowns)
         data = self.problem.line.wire(wire)
         section, bending = data.left_of(self.mesh.x(self.mesh.elements(wire)))
         each = np.column_stack([length, self.model.tension_of(wire), section, bending])

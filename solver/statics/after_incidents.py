@@ -47,8 +47,8 @@ from catenary.solver.linear.unit_responses import Windows, reach
 from catenary.solver.model import beam
 from catenary.solver.model.axial_motion import shape_of, tensioned_ends
 from catenary.solver.model.loads import ShapeLoad
-from catenary.solver.model.matrices import OperatorBands, iterate_entries, whole_matrix
-from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.matrices import OperatorBands, iterate_sums, whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import switching_links
@@ -103,12 +103,12 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     load, energy = np.zeros(model.n_dofs), 0.0
     for wire, now in zip(problem.line.wires, after.line.wires, strict=True):
         pairs = mesh.elements(wire.name)
-        middle = mesh.x(pairs).mean(axis=1)
+        middle = mesh.middles(wire.name)
         lost = now.tension_at(middle) - wire.tension_at(middle)
         if not lost.any():
             continue
         for plane, course, slope in form.planes():
-            dofs, length = wire_elements(first, wire.name, plane)
+            dofs, length = first.wire_elements(wire.name, plane)
             shape = shape_of(course, slope, pairs)
             pull = np.einsum("nij,nj->ni", beam.stiffness(length, 0.0, lost), shape)
             np.add.at(load, dofs, -pull)
@@ -226,9 +226,8 @@ def _times(
     collective."""
     first, n = ownership.first, ownership.n_local
     total = np.zeros(n)
-    for rows, columns, entries in iterate_entries(
-        model, first, ownership.last, 0.0, stiffness, damping
-    ):
+    sums = [(0.0, stiffness, damping)]
+    for rows, columns, (entries,) in iterate_sums(model, first, ownership.last, sums):
         total += np.bincount(rows - first, weights=entries * values[columns], minlength=n)
     return total
 

@@ -330,14 +330,13 @@ def tension_along(model: Model, form: Equilibrium) -> tuple[WireAtRest, ...]:
     """The wires of a line at rest whose effects let them move along the track."""
     every, found = ends_of(model), []
     for wire in model.problem.line.wires:
-        pairs = model.mesh.elements(wire.name)
-        x = model.mesh.x(pairs).mean(axis=1)
+        x = model.mesh.middles(wire.name)
         installed = wire.tension_at(x)
         tension = installed + form.gained_tension.get(wire.name, np.zeros(x.size))
         ends = tuple(end for end in every if end.wire == wire.name)
         moved, share = np.zeros(len(ends)), np.zeros(len(ends))
         for i, end in enumerate(ends):
-            element = int(np.flatnonzero((pairs == end.node).any(axis=1))[0])
+            element = end.element(model.mesh)
             share[i] = tension[element] / installed[element] - 1.0
             if form.along.size:
                 moved[i] = end.outwards * form.along[end.node]

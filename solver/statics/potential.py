@@ -27,7 +27,7 @@ from catenary.solver.model.axial_motion import (
     shape_of,
     slope_rows,
 )
-from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.wind import mean_load
@@ -57,8 +57,8 @@ def dead_loads(model: Model) -> np.ndarray:
     if wind is None:
         return load
     for wire in line.wires:
-        dofs, length = wire_elements(model, wire.name, LEVEL)
-        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        dofs, length = model.wire_elements(wire.name, LEVEL)
+        middle = model.mesh.middles(wire.name)
         pull = mean_load(wind, model.problem.tunnels, wire, middle)
         np.add.at(load, dofs, pull[:, None] * beam.uniform_load(length))
         if line.curve is not None:
@@ -79,8 +79,8 @@ def curve_load(model: Model, form: Equilibrium | None) -> np.ndarray:
         return load
     for wire in model.problem.line.wires:
         upright, length = model.wire_elements(wire.name)
-        level, _ = wire_elements(model, wire.name, LEVEL)
-        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        level, _ = model.wire_elements(wire.name, LEVEL)
+        middle = model.mesh.middles(wire.name)
         pull = wire.tension_at(middle) * length
         for dofs, rows in zip((upright, level), curve_rows(model, wire.name, form), strict=True):
             np.add.at(load, dofs, -pull[:, None] * rows)
@@ -95,7 +95,7 @@ def exact_moments(model: Model) -> np.ndarray:
     curve = line.curve if model.simulated.lateral else None
     for wire in line.wires:
         dofs, length = model.wire_elements(wire.name)
-        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        middle = model.mesh.middles(wire.name)
         tension = wire.tension_at(middle)
         lacks = beam.moment_share(length, wire.bending_stiffness, tension) - 1.0
         moments = lacks[:, None] * beam.uniform_load(length) * np.array([0.0, 1.0, 0.0, 1.0])
@@ -105,7 +105,7 @@ def exact_moments(model: Model) -> np.ndarray:
             pull = curve.upright_curvature_at(middle) * tension
             np.add.at(load, dofs, pull[:, None] * moments)
             pull = curve.sideways_pull_at(middle) * weight + curve.curvature_at(middle) * tension
-            sideways, _ = wire_elements(model, wire.name, LEVEL)
+            sideways, _ = model.wire_elements(wire.name, LEVEL)
             np.add.at(load, sideways, pull[:, None] * moments)
     return load
 
@@ -242,7 +242,7 @@ class _Wire:
         self._other_bending = other_bending if other_bending.any() else None
         self._planes = []
         for plane, course, slope in known.planes():
-            dofs, _ = wire_elements(model, wire.name, plane)
+            dofs, _ = model.wire_elements(wire.name, plane)
             self._planes.append((dofs, shape_of(course, slope, pairs)))
         self._curve, self._ends = model.problem.line.curve, ends
         self._curved = self._in_curve(np.zeros(model.n_dofs))

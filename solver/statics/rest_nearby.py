@@ -71,9 +71,8 @@ class TensionedEnd:
         self.end, self._travel = end, tensioner.travel
         self.unknown = int(model.dofs(np.array([end.node]), "u")[0])
         self._low, self._high = tensioner.band(end.wire, wire, model.problem.gravity)
-        pairs = model.mesh.elements(end.wire)
-        self._element = int(np.flatnonzero((pairs == end.node).any(axis=1))[0])
-        self._installed = float(wire.tension_at(model.mesh.x(pairs[self._element]).mean()))
+        self._element = end.element(model.mesh)
+        self._installed = float(wire.tension_at(model.mesh.middles(end.wire)[self._element]))
         self.pull = wire.tension if tensioner.turns else None
         self.held_at = 0.0
 
@@ -410,9 +409,8 @@ def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
 
 def _refuse_slack_wires(model: Model, form: Equilibrium) -> None:
     for name, gained in form.gained_tension.items():
-        wire, pairs = model.problem.line.wire(name), model.mesh.elements(name)
-        middle = model.mesh.x(pairs).mean(axis=1)
-        left = wire.tension_at(middle) + gained
+        middle = model.mesh.middles(name)
+        left = model.problem.line.wire(name).tension_at(middle) + gained
         if left.min() <= 0.0:
             raise InputError(
                 f"{name} would be slack{where(model)} (tension {left.min() + 0.0:.3g} N at "

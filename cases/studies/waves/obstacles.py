@@ -23,9 +23,8 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model import beam
 from catenary.solver.model.matrices import whole_matrix
-from catenary.solver.model.model import Block, Model, wire_elements
+from catenary.solver.model.model import Block, Model
 from catenary.solver.model.partition import distribute
-from catenary.solver.model.unknowns import UPRIGHT
 from catenary.solver.problem.problem import Damping, Numerics, Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.waves.reflection import answer_of, change_of_wire, scattered
@@ -143,7 +142,7 @@ def _model(bench: Bench, problem: Problem) -> Model:
 
 def _change(model: Model, wire: Wire, beyond: Conductor) -> None:
     """Make a wire another one beyond the middle: its elements get the difference of both wires."""
-    dofs, length = wire_elements(model, wire.name, UPRIGHT)
+    dofs, length = model.wire_elements(wire.name)
     there = model.mesh.x(model.mesh.elements(wire.name)).min(axis=1) > HALF - 1e-6
     dofs, length = dofs[there], length[there]
     mass = beam.mass(length, beyond.mass_per_length - wire.mass_per_length)
