@@ -48,13 +48,12 @@ from scipy import linalg
 
 from catenary.base.errors import NotConverged, RunBroken
 from catenary.mbs.rigid.bodies import Motion, Quantity
-from catenary.mbs.rigid.system import System, independent_rows
+from catenary.mbs.rigid.system import CLOSED, System, closed_within, independent_rows
 
 # Generalised forces (6 n, s) of unit forces at a motion.
 Ways = Callable[[Motion], np.ndarray]
 
-# Largest error of a row that is left [m, cosine; 1/s], where errors are removed.
-TOLERANCE = 1e-12
+# Removals of the errors of joints after a step, at most.
 MAX_REMOVALS = 8
 # A pivot of dependent coordinates below this part of the largest one: others are chosen.
 WORN = 1e-4
@@ -237,7 +236,7 @@ class Stepper:
             rows = self.system.constraints(motion.with_velocities(velocities), time)
             error = rows.rate
             for _ in range(MAX_REMOVALS):
-                if np.abs(error).max() <= TOLERANCE * (1.0 + np.abs(velocities).max()):
+                if np.abs(error).max() <= CLOSED * (1.0 + np.abs(velocities).max()):
                     break
                 step = self._solver.removal(error)
                 velocities = velocities + step
@@ -252,7 +251,7 @@ class Stepper:
 
     def _closed(self, motion: Motion, time: float) -> Motion:
         """Errors of places removed with the rows of the prediction, which are nearly the same."""
-        limit = TOLERANCE * max(1.0, float(np.abs(motion.position).max()))
+        limit = closed_within(motion)
         for _ in range(MAX_REMOVALS):
             errors = self.system.constraints(motion, time).value
             if np.abs(errors).max() <= limit:

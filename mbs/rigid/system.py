@@ -50,8 +50,8 @@ from catenary.solver.kernels import native
 
 # A row of Phi_q that the rows before it explain but for this part of its length is redundant.
 DEPENDENT = 1e-8
-# Error of a row of a joint that is closed [m, cosine], within 1 m of the origin.
-_CLOSED = 1e-12
+# Error of a row of a joint that is closed [m, cosine; 1/s], within 1 m of the origin.
+CLOSED = 1e-12
 # Of Newton's method that closes joints.
 _MOST_ITERATIONS = 30
 _ACROSS_TRACK, _ALONG_TRACK = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
@@ -72,6 +72,12 @@ class Accelerations(NamedTuple):
 
     acceleration: np.ndarray
     multipliers: np.ndarray
+
+
+def closed_within(motion: Motion) -> float:
+    """Error of a row of a joint that is closed [m, cosine]: what round-off allows, which grows with
+    the distance from the origin."""
+    return CLOSED * max(1.0, float(np.abs(motion.position).max()))
 
 
 def independent_rows(jacobian: np.ndarray) -> np.ndarray:
@@ -248,8 +254,7 @@ class System:
         """
         if not self.joints:
             return motion
-        # What round-off allows, which grows with the distance from the origin.
-        limit = _CLOSED * max(1.0, float(np.abs(motion.position).max()))
+        limit = closed_within(motion)
         for _ in range(_MOST_ITERATIONS + 1):
             rows = self.constraints(motion, time)
             if np.abs(rows.value).max() <= limit:
