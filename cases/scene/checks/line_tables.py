@@ -268,8 +268,7 @@ def _data_of_effect(scene: Scene) -> list[str]:
     found, overlap = [], table.overlap
     if overlap and "along" in overlap.model_fields_set and not recorded:
         found.append("line.overlap.along")
-    ends = (("start", table.ends.start), ("end", table.ends.end))
-    found += [f"line.ends.{side}.along" for side, end in ends if end.along == TENSIONER]
+    found += [f"line.ends.{side}.along" for side, end in table.ends if end.along == TENSIONER]
     found += ["line.temperature.difference_K"] if table.temperature.difference_K else []
     found += ["line.mid_points_m"] if table.mid_points_m else []
     if not recorded:
@@ -293,7 +292,7 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
     given = table.tensioner.model_fields_set
     if not given or scene.effects.get("tensioners") is False:
         return
-    ends = [table.ends.start.along, table.ends.end.along]
+    ends = [end.along for _, end in table.ends]
     ends += [] if table.overlap is None else [table.overlap.along]
     if TENSIONER not in ends and not _ends_of_free_wires(table):
         yield scene.fault(
@@ -430,7 +429,7 @@ def _has_tensioner(wire: Wire, along: AlongTrack, line: LineData) -> bool:
 
 def _excluded(scene: Scene) -> Iterator[Fault]:
     """Ends and windows that exclude motion along the track."""
-    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+    for side, end in scene.line.ends:
         if end.kind == "periodic":
             yield scene.refused(
                 f"line.ends.{side}.kind",
@@ -448,7 +447,7 @@ def _excluded(scene: Scene) -> Iterator[Fault]:
 def check_ends(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Ends that cannot be."""
     yield from _layers(scene, line)
-    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+    for side, end in scene.line.ends:
         if end.kind == "periodic":
             yield from _goes_on(scene, line, side)
 
@@ -501,7 +500,7 @@ def _layers(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Layers that are longer than the line, or reach into what is judged."""
     masts, n = line.support_positions, line.n_spans
     stretch = scene.evaluation
-    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+    for side, end in scene.line.ends:
         if end.spans is None:
             continue
         key = f"line.ends.{side}.spans"

@@ -1,6 +1,7 @@
-"""Whether pantographs can be what a scene says, and fit the vehicle's motion, the air and the line.
+"""Whether pantographs can be what a scene says, and fit the vehicle's motion, the line and the air.
 
-Of the air these are wind, uplift and tunnels, which must find what they need.
+Mechanisms must reach the wire, and strips be long enough for it; wind, tunnels and uplift must find
+what they act on.
 """
 
 from __future__ import annotations
@@ -43,6 +44,188 @@ _LEADS = 0.05
 _TINY = 1e-6
 
 
+def check_pantographs(scene: Scene) -> Iterator[Fault]:
+    """Names and forces that are wrong with a kind of pantograph."""
+    yield from _static_forces(scene)
+    for name, table in scene.pantographs.items():
+        if isinstance(table, MultibodyTable):
+            yield from _names(scene, name, table)
+            yield from _actuator(scene, name, table)
+
+
+def check_mechanisms(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Mechanisms on the train that cannot be assembled, or do not reach the wire from the height
+    that ``nominal_height_m`` puts them to. Names and forces have no fault.
+
+    The machinery of multibody systems is imported here, for scenes that have a mechanism.
+    """
+    found: list[Fault] = []
+    for name, table in _kinds(scene).items():
+        if isinstance(table, MultibodyTable):
+            try:
+                _standing(scene, name, table)
+            except (InputError, RunBroken) as error:
+                found.append(scene.fault(f"pantographs.{name}", f"cannot be built: {error}"))
+    yield from found or _out_of_reach(scene, line)
+
+
+def _kinds(scene: Scene) -> dict[str, PantographTable]:
+    """Tables of the kinds of pantograph that are on the train, by their names, leading one first.
+
+    Names have no fault.
+    """
+    return {place.name: scene.pantographs[place.name] for place in scene.train.pantographs}
+
+
+def _out_of_reach(scene: Scene, line: LineData) -> Iterator[Fault]:
+    lowest = line.lowest_contact
+    heights = lowest, line.contact_height
+    for name, table in _kinds(scene).items():
+        if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
+            continue
+        data, standing = _standing(scene, name, table)
+        for height in heights:
+            if _reaches(data, standing.working_height + height - table.nominal_height_m):
+                continue
+            yield scene.refused(
+                f"pantographs.{name}.nominal_height_m",
+                f"the contact wire hangs at {lowest:.4g} to {line.contact_height:.4g} m, where its "
+                f"head would be {height - table.nominal_height_m:+.4g} m away from there, beyond "
+                "the reach of its mechanism",
+            )
+            break
+
+
+def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
+    """Whether a kind of pantograph can go down by ``drop`` [m] from wherever the wire is."""
+    table = scene.pantographs[name]
+    if not isinstance(table, MultibodyTable):
+        return True
+    lowest = line.lowest_contact
+    nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
+    data, standing = _standing(scene, name, table)
+    return _reaches(data, standing.working_height + lowest - nominal - drop - _LEADS)
+
+
+def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, Standing]:
+    """A mechanism, and how it stands."""
+    from catenary.cases.scene.train.multibody import multibody_of
+    from catenary.mbs.mechanism.multibody_pantograph import stand
+
+    data = multibody_of(name, table, scene.train.speed_km_h)
+    return data, stand(data)
+
+
+def _reaches(data: MultibodyData, arm: float) -> bool:
+    """Whether a mechanism can have its arm at a height above its base [m]."""
+    from catenary.mbs.mechanism.multibody_pantograph import HOLDER, reduced, stand
+    from catenary.mbs.rigid.joints import Constant, PrescribedPoint
+
+    if data.all_bodies is None:
+        heights = reduced(data).heights
+        return bool(heights[0] <= arm <= heights[-1])
+    standing = stand(data)
+    holder = PrescribedPoint(HOLDER, data.arm, Constant(arm))
+    try:
+        standing.system.with_joints(holder).assemble(standing.motion)
+    except InputError:
+        return False
+    return True
+
+
+def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
+    key = f"pantographs.{kind}"
+    bodies = list(table.bodies)
+    if SPACE in bodies:
+        why = "is the name of the frame at rest; choose another"
+        yield scene.fault(f"{key}.bodies.{SPACE}", why)
+    for role in ("head", "arm"):
+        yield from scene.among(f"{key}.{role}", bodies)
+    if table.head == table.arm:
+        yield scene.refused(f"{key}.head", "the arm is this body too; they are two")
+    if table.actuator is not None:
+        yield from scene.among(f"{key}.actuator", list(table.forces))
+    for place in _uses(table):
+        # A force or mass on one body alone would have no effect on the space at rest.
+        on_one = place.endswith(".body")
+        yield from scene.among(f"{key}.{place}", bodies if on_one else [*bodies, SPACE])
+    for what in ("joints", "forces"):
+        for label, one in getattr(table, what).items():
+            if getattr(one, "i", None) == getattr(one, "j", SPACE):
+                yield scene.fault(f"{key}.{what}.{label}", f"has {shown(one.i)} on both sides")
+    for label in table.forces:
+        if label in table.joints or label == "gravity":
+            yield scene.fault(f"{key}.forces.{label}", "has the name of a joint or of gravity")
+
+
+def _uses(table: MultibodyTable) -> Iterator[str]:
+    """Keys of joints and forces that hold names of bodies."""
+    for what in ("joints", "forces"):
+        for label, one in getattr(table, what).items():
+            for end in ("i", "j", "body"):
+                if hasattr(one, end):
+                    yield f"{what}.{label}.{end}"
+
+
+def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
+    if not table.calibrate or table.actuator not in table.forces:
+        return
+    force = table.forces[table.actuator]
+    key = f"pantographs.{kind}.actuator"
+    if not isinstance(force, ActuatorTable):
+        yield scene.refused(key, f"that is a {force.type}, no actuator")
+    elif force.force_N is None:
+        why = "its force is a table, so that it cannot be calibrated; write calibrate = false"
+        yield scene.refused(key, why)
+
+
+def _static_forces(scene: Scene) -> Iterator[Fault]:
+    speed = scene.train.speed_km_h
+    for name, table in _kinds(scene).items():
+        if table.static_force_by_speed is None:
+            continue
+        if wanted_force(table, speed) is None:
+            first, last = table.static_force_by_speed[0][0], table.static_force_by_speed[-1][0]
+            key = "train.speed_km_h"
+            held = f"{first:g} km/h" if first == last else f"{first:g} to {last:g} km/h"
+            yield Fault(
+                key,
+                f"{key} is {speed:g} km/h {scene.origin.of(key)}; "
+                f"pantographs.{name}.static_force_by_speed only holds forces for {held}",
+            )
+
+
+def check_laws(scene: Scene) -> Iterator[Fault]:
+    """Laws on masses that are not there, and what all bodies or slow samples do not allow."""
+    for name, table in scene.pantographs.items():
+        key = f"pantographs.{name}"
+        lumped = isinstance(table, LumpedTable)
+        n = len(table.masses_kg) if isinstance(table, LumpedTable) else 2
+        for number, law in enumerate(table.laws):
+            if law.at_mass is not None and law.at_mass > n:
+                has = f"{n} masses" if lumped else "2, the head and the arm"
+                yield scene.refused(f"{key}.laws.{number}.at_mass", f"the pantograph has {has}")
+        whole = not isinstance(table, LumpedTable) and table.motion == "all_bodies"
+        for part, given in (("laws", table.laws), ("regulation", table.regulation)):
+            if whole and given:
+                yield scene.refused(
+                    f"{key}.motion",
+                    f"{key}.{part} acts on mechanisms that are reduced to tables only",
+                )
+        regulation = table.regulation
+        if regulation is not None and regulation.sample_s < scene.numerics.dt_s:
+            yield scene.refused(
+                f"{key}.regulation.sample_s",
+                f"a sample takes at least a step, numerics.dt_s = {scene.numerics.dt_s:g}",
+            )
+
+
+def has_front(table: PantographTable) -> bool:
+    """Whether a pantograph that runs the other way round is another one."""
+    turned = table.aerodynamics is not None and table.aerodynamics.reversed is not None
+    return turned or table.type == "multibody"
+
+
 def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Contradictions between vehicle, heads and line."""
     yield from _vehicle_acts(scene)
@@ -53,14 +236,6 @@ def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
     yield from _waves(scene)
     if not reaches:
         yield from _strip_lengths(scene, line)
-
-
-def _kinds(scene: Scene) -> dict[str, PantographTable]:
-    """Tables of the kinds of pantograph that are on the train, by their names, leading one first.
-
-    Names have no fault.
-    """
-    return {place.name: scene.pantographs[place.name] for place in scene.train.pantographs}
 
 
 def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
@@ -215,174 +390,6 @@ def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
     return float(places[first, strip]), float(start + speed * times[first])
 
 
-def check_pantographs(scene: Scene) -> Iterator[Fault]:
-    """Names and forces that are wrong with a kind of pantograph."""
-    yield from _static_forces(scene)
-    for name, table in scene.pantographs.items():
-        if isinstance(table, MultibodyTable):
-            yield from _names(scene, name, table)
-            yield from _actuator(scene, name, table)
-
-
-def check_mechanisms(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Mechanisms on the train that cannot be assembled, or do not reach the wire from the height
-    that ``nominal_height_m`` puts them to. Names and forces have no fault.
-
-    The machinery of multibody systems is imported here, for scenes that have a mechanism.
-    """
-    found: list[Fault] = []
-    for name, table in _kinds(scene).items():
-        if isinstance(table, MultibodyTable):
-            try:
-                _standing(scene, name, table)
-            except (InputError, RunBroken) as error:
-                found.append(scene.fault(f"pantographs.{name}", f"cannot be built: {error}"))
-    yield from found or _out_of_reach(scene, line)
-
-
-def _out_of_reach(scene: Scene, line: LineData) -> Iterator[Fault]:
-    lowest = line.lowest_contact
-    heights = lowest, line.contact_height
-    for name, table in _kinds(scene).items():
-        if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
-            continue
-        data, standing = _standing(scene, name, table)
-        for height in heights:
-            if _reaches(data, standing.working_height + height - table.nominal_height_m):
-                continue
-            yield scene.refused(
-                f"pantographs.{name}.nominal_height_m",
-                f"the contact wire hangs at {lowest:.4g} to {line.contact_height:.4g} m, where its "
-                f"head would be {height - table.nominal_height_m:+.4g} m away from there, beyond "
-                "the reach of its mechanism",
-            )
-            break
-
-
-def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
-    """Whether a kind of pantograph can go down by ``drop`` [m] from wherever the wire is."""
-    table = scene.pantographs[name]
-    if not isinstance(table, MultibodyTable):
-        return True
-    lowest = line.lowest_contact
-    nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
-    data, standing = _standing(scene, name, table)
-    return _reaches(data, standing.working_height + lowest - nominal - drop - _LEADS)
-
-
-def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, Standing]:
-    """A mechanism, and how it stands."""
-    from catenary.cases.scene.train.multibody import multibody_of
-    from catenary.mbs.mechanism.multibody_pantograph import stand
-
-    data = multibody_of(name, table, scene.train.speed_km_h)
-    return data, stand(data)
-
-
-def _reaches(data: MultibodyData, arm: float) -> bool:
-    """Whether a mechanism can have its arm at a height above its base [m]."""
-    from catenary.mbs.mechanism.multibody_pantograph import HOLDER, reduced, stand
-    from catenary.mbs.rigid.joints import Constant, PrescribedPoint
-
-    if data.all_bodies is None:
-        heights = reduced(data).heights
-        return bool(heights[0] <= arm <= heights[-1])
-    standing = stand(data)
-    holder = PrescribedPoint(HOLDER, data.arm, Constant(arm))
-    try:
-        standing.system.with_joints(holder).assemble(standing.motion)
-    except InputError:
-        return False
-    return True
-
-
-def _names(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
-    key = f"pantographs.{kind}"
-    bodies = list(table.bodies)
-    if SPACE in bodies:
-        why = "is the name of the frame at rest; choose another"
-        yield scene.fault(f"{key}.bodies.{SPACE}", why)
-    for role in ("head", "arm"):
-        yield from scene.among(f"{key}.{role}", bodies)
-    if table.head == table.arm:
-        yield scene.refused(f"{key}.head", "the arm is this body too; they are two")
-    if table.actuator is not None:
-        yield from scene.among(f"{key}.actuator", list(table.forces))
-    for place in _uses(table):
-        # A force or mass on one body alone would have no effect on the space at rest.
-        on_one = place.endswith(".body")
-        yield from scene.among(f"{key}.{place}", bodies if on_one else [*bodies, SPACE])
-    for what in ("joints", "forces"):
-        for label, one in getattr(table, what).items():
-            if getattr(one, "i", None) == getattr(one, "j", SPACE):
-                yield scene.fault(f"{key}.{what}.{label}", f"has {shown(one.i)} on both sides")
-    for label in table.forces:
-        if label in table.joints or label == "gravity":
-            yield scene.fault(f"{key}.forces.{label}", "has the name of a joint or of gravity")
-
-
-def _uses(table: MultibodyTable) -> Iterator[str]:
-    """Keys of joints and forces that hold names of bodies."""
-    for what in ("joints", "forces"):
-        for label, one in getattr(table, what).items():
-            for end in ("i", "j", "body"):
-                if hasattr(one, end):
-                    yield f"{what}.{label}.{end}"
-
-
-def _actuator(scene: Scene, kind: str, table: MultibodyTable) -> Iterator[Fault]:
-    if not table.calibrate or table.actuator not in table.forces:
-        return
-    force = table.forces[table.actuator]
-    key = f"pantographs.{kind}.actuator"
-    if not isinstance(force, ActuatorTable):
-        yield scene.refused(key, f"that is a {force.type}, no actuator")
-    elif force.force_N is None:
-        why = "its force is a table, so that it cannot be calibrated; write calibrate = false"
-        yield scene.refused(key, why)
-
-
-def _static_forces(scene: Scene) -> Iterator[Fault]:
-    speed = scene.train.speed_km_h
-    for name, table in _kinds(scene).items():
-        if table.static_force_by_speed is None:
-            continue
-        if wanted_force(table, speed) is None:
-            first, last = table.static_force_by_speed[0][0], table.static_force_by_speed[-1][0]
-            key = "train.speed_km_h"
-            held = f"{first:g} km/h" if first == last else f"{first:g} to {last:g} km/h"
-            yield Fault(
-                key,
-                f"{key} is {speed:g} km/h {scene.origin.of(key)}; "
-                f"pantographs.{name}.static_force_by_speed only holds forces for {held}",
-            )
-
-
-def check_laws(scene: Scene) -> Iterator[Fault]:
-    """Laws on masses that are not there, and what all bodies or slow samples do not allow."""
-    for name, table in scene.pantographs.items():
-        key = f"pantographs.{name}"
-        lumped = isinstance(table, LumpedTable)
-        n = len(table.masses_kg) if isinstance(table, LumpedTable) else 2
-        for number, law in enumerate(table.laws):
-            if law.at_mass is not None and law.at_mass > n:
-                has = f"{n} masses" if lumped else "2, the head and the arm"
-                yield scene.refused(f"{key}.laws.{number}.at_mass", f"the pantograph has {has}")
-        whole = not isinstance(table, LumpedTable) and table.motion == "all_bodies"
-        for part, given in (("laws", table.laws), ("regulation", table.regulation)):
-            if whole and given:
-                yield scene.refused(
-                    f"{key}.motion",
-                    f"{key}.{part} acts on mechanisms that are reduced to tables only",
-                )
-        regulation = table.regulation
-        if regulation is not None and regulation.sample_s < scene.numerics.dt_s:
-            yield scene.refused(
-                f"{key}.regulation.sample_s",
-                f"a sample takes at least a step, numerics.dt_s = {scene.numerics.dt_s:g}",
-            )
-
-
 def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Wires without a diameter, stretches that overlap or are nowhere, heights in the ground."""
     table = scene.wind
@@ -401,12 +408,6 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     wind = wind_of(table)
     if wind is not None and (not math.isfinite(wind.mean) or wind.mean <= 0.0):
         yield scene.refused("wind.height_m", "there is no wind at that height")
-
-
-def has_front(table: PantographTable) -> bool:
-    """Whether a pantograph that runs the other way round is another one."""
-    turned = table.aerodynamics is not None and table.aerodynamics.reversed is not None
-    return turned or table.type == "multibody"
 
 
 def check_tunnels(scene: Scene, line: LineData) -> Iterator[Fault]:
