@@ -57,6 +57,8 @@ Ways = Callable[[Motion], np.ndarray]
 MAX_REMOVALS = 8
 # A pivot of dependent coordinates below this part of the largest one: others are chosen.
 WORN = 1e-4
+# Change of a right side's solution that ends the augmented Lagrangian, over its size.
+_SETTLED = 1e-12
 
 
 class Prediction(NamedTuple):
@@ -371,10 +373,8 @@ class Augmented(_Multipliers):
 
     feedback: float | None = None
 
-    def __init__(
-        self, penalty: float = 1e8, tolerance: float = 1e-12, max_iterations: int = 30
-    ) -> None:
-        self.penalty, self.tolerance, self.max_iterations = penalty, tolerance, max_iterations
+    def __init__(self, penalty: float = 1e8, max_iterations: int = 30) -> None:
+        self.penalty, self.max_iterations = penalty, max_iterations
 
     def factor(self, operator: np.ndarray, jacobian: np.ndarray) -> None:
         """(A + a J^T J)^-1 a J^T as A^-1 J^T (1 / a + J A^-1 J^T)^-1, which loses no digits."""
@@ -402,7 +402,7 @@ class Augmented(_Multipliers):
             change = change + step
             # Each right side by its own size: unit forces move far less than accelerations.
             size = np.abs(change).max(axis=0)
-            if (np.abs(step).max(axis=0) <= self.tolerance * size).all():
+            if (np.abs(step).max(axis=0) <= _SETTLED * size).all():
                 return change
         raise NotConverged(
             "The augmented Lagrangian does not converge within a step: choose another penalty "
