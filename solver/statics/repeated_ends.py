@@ -143,25 +143,20 @@ def ends_that_follow(model: Model, loads: np.ndarray) -> EndsThatFollow:
     x, masts = model.mesh.points[:, 0], model.problem.line.support_positions
     largest = float(np.abs(loads).max(initial=0.0))
     sides, pairs = [False, False], [np.zeros((0, 2), dtype=np.int64)]
+    followed = {name: mast for name, mast in _FOLLOWED.items() if name in model.unknowns}
     for side, (end, mast) in enumerate((masts[:2], masts[:-3:-1])):
         at = np.abs(x[repeated.ends] - end) < SAME_STATION
         low, high = sorted((float(end), float(mast)))
         within = np.flatnonzero((x > low + SAME_STATION) & (x < high - SAME_STATION))
-        on_span = np.abs(loads[_dofs(model, within)]).max(initial=0.0)
+        inner = np.concatenate([model.dofs(within, name) for name in followed])
+        on_span = np.abs(loads[inner]).max(initial=0.0)
         if not at.any() or on_span <= _NOTHING * largest:
             continue
         sides[side] = True
-        for name, number in _FOLLOWED.items():
-            if name in model.unknowns:
-                nodes = repeated.ends[at], repeated.masts[number][at]
-                pairs.append(np.stack([model.dofs(one, name) for one in nodes], axis=1))
+        for name, number in followed.items():
+            nodes = repeated.ends[at], repeated.masts[number][at]
+            pairs.append(np.stack([model.dofs(one, name) for one in nodes], axis=1))
     # Wires that move together share unknowns.
     found = np.unique(np.concatenate(pairs), axis=0)
-    ends, followed = found[~np.isin(found[:, 0], model.constrained)].T
-    return EndsThatFollow(ends, followed, (sides[0], sides[1]))
-
-
-def _dofs(model: Model, nodes: np.ndarray) -> np.ndarray:
-    """Numbers of all unknowns of nodes in any plane."""
-    names = [name for name in _FOLLOWED if name in model.unknowns]
-    return np.concatenate([model.dofs(nodes, name) for name in names])
+    ends, masts = found[~np.isin(found[:, 0], model.constrained)].T
+    return EndsThatFollow(ends, masts, (sides[0], sides[1]))
