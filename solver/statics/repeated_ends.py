@@ -158,5 +158,5 @@ def ends_that_follow(model: Model, loads: np.ndarray) -> EndsThatFollow:
             pairs.append(np.stack([model.dofs(one, name) for one in nodes], axis=1))
     # Wires that move together share unknowns.
     found = np.unique(np.concatenate(pairs), axis=0)
-    ends, masts = found[~np.isin(found[:, 0], model.constrained)].T
-    return EndsThatFollow(ends, masts, (sides[0], sides[1]))
+    ends, leading = found[~np.isin(found[:, 0], model.constrained)].T
+    return EndsThatFollow(ends, leading, (sides[0], sides[1]))
