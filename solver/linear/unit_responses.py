@@ -16,12 +16,13 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.base.mpi import MPI
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.linear.station_rows import LikeStations
 from catenary.solver.model.alike import kinds_of
 from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
-from catenary.solver.model.unknowns import SAME_STATION, Unknowns
+from catenary.solver.model.unknowns import Unknowns
 
 # Beyond the reach a column is below this share of its peak; two orders under what an iteration
 # over a whole run may add up to and still agree to 1e-9.
@@ -84,7 +85,7 @@ def reach(model: Model, bands: OperatorBands) -> float:
 
 def _around_the_longest(positions: np.ndarray) -> tuple[float, np.ndarray]:
     """Place of the longest element [m], and stations near it at which element lengths change."""
-    stations = positions[np.append(True, np.diff(positions) > SAME_STATION)]
+    stations = positions[np.append(True, np.diff(positions) > SAME_PLACE)]
     lengths = np.diff(stations)
     place = float(stations[np.argmax(lengths)])
     changes = np.abs(np.diff(lengths)) > 0.01 * lengths[1:]
@@ -109,7 +110,7 @@ def _reach_of(
     first, last = model.numbering.within(place - window, place + window)
     x = model.numbering.as_vector(model.mesh.points[:, :1], np.inf)[first:last]
     x[model.constrained_between(first, last) - first] = np.inf
-    loaded = np.flatnonzero((np.abs(x[:, None] - loads) <= SAME_STATION).any(axis=1))
+    loaded = np.flatnonzero((np.abs(x[:, None] - loads) <= SAME_PLACE).any(axis=1))
     right = np.zeros((loaded.size, last - first))
     right[np.arange(loaded.size), loaded] = 1.0
     columns = np.abs(bands.solve(first, last, right))

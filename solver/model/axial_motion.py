@@ -16,11 +16,11 @@ import numpy as np
 
 from catenary.meshgen.line import Curve
 from catenary.meshgen.mesh import LineMesh
-from catenary.meshgen.wires import End
+from catenary.meshgen.wires import SAME_PLACE, End
 from catenary.solver.model import beam
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.unknowns import LEVEL, SAME_STATION, UPRIGHT
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 
 # Slopes at rest that differ by less are one, so that like spans have like matrices [-]. What that
 # changes of a stiffness is a share of 1e-11 of EA.
@@ -140,7 +140,7 @@ def ends_of(model: Model) -> list[WireEnd]:
                 if kind is not End.CLAMPED:
                     x = float(mesh.points[node, 0])
                     if tensioned is None:
-                        tensioned = along.tensioned(x, line_ends, SAME_STATION)
+                        tensioned = along.tensioned(x, line_ends, SAME_PLACE)
                     found.append(WireEnd(int(node), wire.name, tensioned, outwards))
     return found
 

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.model import beam
 from catenary.solver.model.alike import alike
 from catenary.solver.model.link_directions import between_nodes, dropper_directions
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, Bends, Direction, Links, law
 from catenary.solver.model.loads import Load
 from catenary.solver.model.model import Block, Hanging, Model
-from catenary.solver.model.unknowns import LEVEL, SAME_STATION, UPRIGHT
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.problem.problem import Problem
 
 # Displacements of a node beside its height, in which its masses move as well.
@@ -215,7 +216,7 @@ class ModelBuilder:
         anchors, masts = self.mesh.anchors, self.problem.line.support_positions
         x, held = self.mesh.x(anchors), np.ones(anchors.size, dtype=bool)
         for place, goes_on in zip(masts[[0, -1]], self.model.simulated.goes_on, strict=True):
-            held &= (np.abs(x - place) > SAME_STATION) | (not goes_on)
+            held &= (np.abs(x - place) > SAME_PLACE) | (not goes_on)
         return np.asarray(anchors[held])
 
     def hold(self, nodes: np.ndarray, unknown: str) -> None:

@@ -23,11 +23,10 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import SAME_PLACE
 
 # Deflection and slope of a wire in the vertical plane, and in the lateral one.
 UPRIGHT, LEVEL = ("w", "theta_y"), ("v", "theta_z")
-# Nodes closer than this along the track belong to one station [m].
-SAME_STATION = 1e-6
 # Unknowns of a group in a station above which solving by nodes is faster.
 _WIDEST_GROUP = 12
 # Types of stations that a line may have, each with loops of its own; of more the rarer ones are
@@ -94,7 +93,7 @@ def _beside(mesh: LineMesh, together: Mapping[str, str]) -> np.ndarray:
         pieces = [mesh.pieces(wire) for wire in (name, other)]
         sizes = [[piece.size for piece in own] for own in pieces]
         own, beside = mesh.wires[name], mesh.wires[other]
-        if sizes[0] != sizes[1] or np.abs(mesh.x(own) - mesh.x(beside)).max() > SAME_STATION:
+        if sizes[0] != sizes[1] or np.abs(mesh.x(own) - mesh.x(beside)).max() > SAME_PLACE:
             raise InputError(
                 f"without effects.relative_motion {name} and {other} need nodes side by side: the "
                 f"mesh has {own.size} and {beside.size} of them, not all at the same places; "
@@ -209,7 +208,7 @@ def _places(mesh: LineMesh) -> np.ndarray:
     order = np.argsort(mesh.points[:, 0], kind="stable")
     x = mesh.points[order, 0]
     result = np.empty(mesh.n_nodes, dtype=np.int64)
-    result[order] = np.cumsum(np.diff(x, prepend=x[:1]) > SAME_STATION)
+    result[order] = np.cumsum(np.diff(x, prepend=x[:1]) > SAME_PLACE)
     return result
 
 
@@ -341,7 +340,7 @@ class Unknowns:
 
     def first_at(self, x: float) -> int:
         """Number of the first unknown of the station at a place along the track [m]."""
-        return self.within(x - SAME_STATION, np.inf)[0]
+        return self.within(x - SAME_PLACE, np.inf)[0]
 
     def stations_within(
         self, x_low: np.ndarray, x_high: np.ndarray

@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns import SAME_STATION
 from catenary.solver.problem.ends import Fixed
 from catenary.solver.problem.problem import Problem
 
@@ -73,7 +73,7 @@ def repeated_ends(model: Model) -> RepeatedEnds:
 def _node_at(model: Model, wire: str, x: float) -> int:
     """The node of a wire at a place [m], -1 if there is none."""
     nodes = model.mesh.wires[wire]
-    at = np.flatnonzero(np.abs(model.mesh.x(nodes) - x) < SAME_STATION)
+    at = np.flatnonzero(np.abs(model.mesh.x(nodes) - x) < SAME_PLACE)
     return int(nodes[at[0]]) if at.size else -1
 
 
@@ -145,9 +145,9 @@ def ends_that_follow(model: Model, loads: np.ndarray) -> EndsThatFollow:
     sides, pairs = [False, False], [np.zeros((0, 2), dtype=np.int64)]
     followed = {name: mast for name, mast in _FOLLOWED.items() if name in model.unknowns}
     for side, (end, mast) in enumerate((masts[:2], masts[:-3:-1])):
-        at = np.abs(x[repeated.ends] - end) < SAME_STATION
+        at = np.abs(x[repeated.ends] - end) < SAME_PLACE
         low, high = sorted((float(end), float(mast)))
-        within = np.flatnonzero((x > low + SAME_STATION) & (x < high - SAME_STATION))
+        within = np.flatnonzero((x > low + SAME_PLACE) & (x < high - SAME_PLACE))
         inner = np.concatenate([model.dofs(within, name) for name in followed])
         on_span = np.abs(loads[inner]).max(initial=0.0)
         if not at.any() or on_span <= _NOTHING * largest:
