@@ -90,7 +90,7 @@ def drive_width(n_strips: int) -> int:
     return N_DRIVE + 2 * n_strips
 
 
-def named(rows: np.ndarray) -> np.ndarray:
+def drives_by_name(rows: np.ndarray) -> np.ndarray:
     """The numbers that have names of ``rows`` (..., width), a view of shape (...)."""
     return rows[..., :N_DRIVE].view(native.DRIVE)[..., 0]
 

@@ -14,7 +14,13 @@ import numpy as np
 
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.stepping import Part, Raising
-from catenary.mbs.interface import HeadState, Pantograph, called_by_kernels, drive_width, named
+from catenary.mbs.interface import (
+    HeadState,
+    Pantograph,
+    called_by_kernels,
+    drive_width,
+    drives_by_name,
+)
 from catenary.mbs.vehicle import BaseMotion, lifted
 from catenary.solver.kernels import native
 
@@ -70,7 +76,10 @@ class LoweredPantograph:
         else:
             self.stepped, self._head, _ = called_by_kernels(model)
             self._row = np.zeros(drive_width(len(model.strip_offsets)))
-        self._now, self._memory = named(self._row), np.zeros(1, dtype=native.LOWERING_MEMORY)
+        self._now, self._memory = (
+            drives_by_name(self._row),
+            np.zeros(1, dtype=native.LOWERING_MEMORY),
+        )
         self.stepped.lower(native.Lowering(lowering.time, lowering.drop, self._memory))
 
     @property
@@ -117,7 +126,7 @@ class LoweredPantograph:
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what steps to ``times`` [s] depend on, see `SteppedHead`."""
         if self._base is not None:
-            rows = named(drives)
+            rows = drives_by_name(drives)
             rows["roof"], rows["roof_velocity"], _ = self._base.lifts(times)
         if isinstance(self.model, SteppedHead):
             self.model.fill_drives(times, drives)

@@ -28,7 +28,7 @@ class LumpedData:
     i joins mass i to mass i + 1, the last entry joins the last mass to the base. The first mass is
     the whole head, ``strips`` included, which may turn about the track as ``roll`` says. The air
     lifts it by ``uplift``; ``crosswind_factor`` is what a cross wind counts in the air's speed
-    (`air.airflow`). ``laws`` that are not linear act besides.
+    (`wind.airflow`). ``laws`` that are not linear act besides.
     """
 
     masses: tuple[float, ...]

@@ -39,6 +39,14 @@ STEP, SPEED = 1e-5, 1e-4
 NEUTRAL = 1e-8
 # A force left on a free motion above this part of the largest one (or of 1 N): not at rest.
 UNBALANCED = 1e-6
+# Names of what is added to the mechanism here.
+WIRE, HELD = "wire on the head", "arm held for a moment"
+MOST_MASSES = 3
+# Bounds of masses [kg], stiffnesses [N/m] and dampings [N s/m]. A lower bound stands for "none".
+BOUNDS = ((1e-2, 1e3), (1e-3, 1e8), (1e-6, 1e6))
+N_STARTS = 24
+# No further start is tried below this rms error.
+EXACT = 1e-8
 
 
 class Mode(NamedTuple):
@@ -128,7 +136,7 @@ class LinearModel:
         return tuple(sorted(found, key=lambda one: (float(f"{abs(one.root):.6g}"), one.root.real)))
 
 
-def of_chain(data: LumpedData) -> LinearModel:
+def chain_model(data: LumpedData) -> LinearModel:
     """Lumped masses, loaded at the head."""
     push = np.zeros(data.n_masses)
     push[0] = 1.0
@@ -292,10 +300,6 @@ def apparent_mass(frequencies: Vector, receptance: np.ndarray) -> np.ndarray:
     return -1.0 / (omega**2 * receptance)
 
 
-# Names of what is added to the mechanism here.
-WIRE, HELD = "wire on the head", "arm held for a moment"
-
-
 @dataclass(frozen=True)
 class HeadResponse:
     """Small motions of a pantograph around rest under a wire that presses on its head.
@@ -333,7 +337,7 @@ def head_response(data: LumpedData | MultibodyData, static_force: float) -> Head
     if isinstance(data, MultibodyData):
         return _of_mechanism(data)
     masses = {f"mass {k + 1}": mass for k, mass in enumerate(data.masses)}
-    model = with_strips(of_chain(data), data.strips)
+    model = with_strips(chain_model(data), data.strips)
     return HeadResponse(model, static_force, masses, data.stiffnesses[-1])
 
 
@@ -394,14 +398,6 @@ def peaks(model: LinearModel, frequencies: Vector) -> tuple[Peak, ...]:
     return tuple(found)
 
 
-MOST_MASSES = 3
-# Bounds of masses [kg], stiffnesses [N/m] and dampings [N s/m]. A lower bound stands for "none".
-BOUNDS = ((1e-2, 1e3), (1e-3, 1e8), (1e-6, 1e6))
-N_STARTS = 24
-# No further start is tried below this rms error.
-EXACT = 1e-8
-
-
 class ChainFit(NamedTuple):
     """A fitted chain, and how far it is from what it was fitted to.
 
@@ -418,7 +414,7 @@ class ChainFit(NamedTuple):
 
     def receptance(self, frequencies: Vector) -> np.ndarray:
         """Receptance of the fitted chain at its head (n_f,) [m/N]."""
-        return of_chain(self.data).receptance(frequencies)
+        return chain_model(self.data).receptance(frequencies)
 
 
 def fit_chain(frequencies: Vector, receptance: np.ndarray, n_masses: int) -> ChainFit:
@@ -474,7 +470,7 @@ def fit_chain(frequencies: Vector, receptance: np.ndarray, n_masses: int) -> Cha
     if best is None:
         raise RunBroken(f"No chain of {n_masses} masses comes near the receptance.")
     data = _chain(best.x)
-    error = np.abs(of_chain(data).receptance(at) / wanted - 1.0)
+    error = np.abs(chain_model(data).receptance(at) / wanted - 1.0)
     return ChainFit(
         data,
         float(np.sqrt(np.mean(error**2))),
@@ -493,7 +489,7 @@ def _chain(logarithms: np.ndarray) -> LumpedData:
 
 def _residuals(logarithms: np.ndarray, omega: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """log |H / H_wanted| and the difference of phases (2 n,)."""
-    ratio = np.log(of_chain(_chain(logarithms)).receptance(omega / (2.0 * np.pi)) / wanted)
+    ratio = np.log(chain_model(_chain(logarithms)).receptance(omega / (2.0 * np.pi)) / wanted)
     return np.concatenate([ratio.real, ratio.imag])
 
 
@@ -503,7 +499,7 @@ def _slopes(logarithms: np.ndarray, omega: np.ndarray, wanted: np.ndarray) -> np
     With x the motions under a unit force on the head, dH / dp = -x^T (dZ / dp) x.
     """
     data = _chain(logarithms)
-    moved = of_chain(data).amplitudes(omega / (2.0 * np.pi))
+    moved = chain_model(data).amplitudes(omega / (2.0 * np.pi))
     # Stretch of each spring, the last one's to the ground.
     stretched = np.diff(moved, axis=1, append=0.0)
     by_stiffness = -(stretched**2)

@@ -1,4 +1,4 @@
-"""Motion of the pantographs' bases by the vehicle: tables, harmonics, track irregularities.
+"""Motion of the pantographs' bases by the vehicle: splines, harmonics, track irregularities.
 
 Up and to the left are positive. What is a function of the place along the track, such as the track
 itself, reaches every pantograph of the train when it gets there; what is a function of time reaches
@@ -53,6 +53,12 @@ if TYPE_CHECKING:
 
 # Waves of a sum; over a factor of 33 in wavelength each stands for 3 % of it.
 N_WAVES = 120
+GRAVITY = 9.81
+# Steps of a wave of the fastest own motion, where a course of the track is followed in time, and
+# the shortest step [m].
+_STEPS_PER_WAVE, _SHORTEST = 40, 0.01
+# A spline of the track is followed in such steps [m].
+_FINE = 0.1
 
 
 class Spectrum(NamedTuple):
@@ -145,12 +151,6 @@ def sines(
     return np.sqrt(2.0 * power), np.sqrt(edges[:-1] * edges[1:]), phases
 
 
-GRAVITY = 9.81
-# Steps of a wave of the fastest own motion, where a course of the track is followed in time, and
-# the shortest step [m].
-_STEPS_PER_WAVE, _SHORTEST = 40, 0.01
-
-
 @dataclass(frozen=True)
 class Sideways:
     """Further data for lateral motion: ``roll_inertia`` [kg m2]; ``stiffness`` [N/m] and
@@ -193,7 +193,7 @@ class Vehicle:
     sideways: Sideways | None = None
 
 
-class Matrices(NamedTuple):
+class Equations(NamedTuple):
     """M x'' + C x' + K x = B u + D u', u (2,) at the front and the rear bogie; the roof's motion
     is ``roof`` @ x."""
 
@@ -205,7 +205,7 @@ class Matrices(NamedTuple):
     roof: np.ndarray
 
 
-def matrices(vehicle: Vehicle, direction: str) -> Matrices | None:
+def equations_of(vehicle: Vehicle, direction: str) -> Equations | None:
     """Equations of motion of a vehicle in a ``direction``, upward ("vertical") or sideways
     ("lateral"); None if there are none. Not collective."""
     if direction == "vertical":
@@ -213,7 +213,7 @@ def matrices(vehicle: Vehicle, direction: str) -> Matrices | None:
     return None if vehicle.sideways is None else _sideways(vehicle, vehicle.sideways)
 
 
-def transfer(
+def roof_transfer(
     vehicle: Vehicle, direction: str, wave_numbers: np.ndarray, speed: float
 ) -> np.ndarray:
     """The roof's motion where the pantograph is, over that of the track there.
@@ -221,7 +221,7 @@ def transfer(
     Complex, of the shape of ``wave_numbers`` [rad/m], for sines along the track that are passed at
     ``speed`` [m/s] for ever. Not collective.
     """
-    found = matrices(vehicle, direction)
+    found = equations_of(vehicle, direction)
     if found is None:
         return np.ones(wave_numbers.shape, dtype=complex)
     half = 0.5 * vehicle.bogie_distance
@@ -259,7 +259,7 @@ def roof_course(
     places : of the pantograph [m], evenly spaced
     motion : of the roof there [m]
     """
-    found = matrices(vehicle, direction)
+    found = equations_of(vehicle, direction)
     if found is None:
         return points, values
     system = _in_time(found)
@@ -286,7 +286,7 @@ def roof_course(
     return places, rest + np.asarray(motion).reshape(n)
 
 
-def _in_time(found: Matrices) -> signal.StateSpace:
+def _in_time(found: Equations) -> signal.StateSpace:
     """The equations with u alone: velocities are counted without what u' gives them."""
     from scipy import signal
 
@@ -301,7 +301,7 @@ def _in_time(found: Matrices) -> signal.StateSpace:
     return signal.StateSpace(a, b, c, np.zeros((1, 2)))
 
 
-def _upward(vehicle: Vehicle) -> Matrices:
+def _upward(vehicle: Vehicle) -> Equations:
     half, m = 0.5 * vehicle.bogie_distance, vehicle.bogie_mass
     bogies = 2 if m > 0.0 else 0
     n = 2 + bogies
@@ -324,10 +324,10 @@ def _upward(vehicle: Vehicle) -> Matrices:
         damping += vehicle.damping * np.outer(stretch, stretch)
     roof = np.zeros(n)
     roof[:2] = 1.0, vehicle.pantograph_ahead
-    return Matrices(np.diag(masses), damping, stiffness, by_place, by_rate, roof)
+    return Equations(np.diag(masses), damping, stiffness, by_place, by_rate, roof)
 
 
-def _sideways(vehicle: Vehicle, side: Sideways) -> Matrices:
+def _sideways(vehicle: Vehicle, side: Sideways) -> Equations:
     half, square = 0.5 * vehicle.bogie_distance, (0.5 * side.spring_distance) ** 2
     masses = np.diag([vehicle.mass, vehicle.pitch_inertia, side.roll_inertia])
     damping, stiffness = np.zeros((2, 3, 3))
@@ -343,11 +343,11 @@ def _sideways(vehicle: Vehicle, side: Sideways) -> Matrices:
     damping[2, 2] += 2.0 * vehicle.damping * square
     # Points above the centre of mass go to the right where the left side is lifted.
     roof = np.array([1.0, vehicle.pantograph_ahead, -side.roof_above])
-    return Matrices(masses, damping, stiffness, by_place, by_rate, roof)
+    return Equations(masses, damping, stiffness, by_place, by_rate, roof)
 
 
 @dataclass(frozen=True)
-class Table:
+class Spline:
     """A cubic spline through ``values`` [m] at ``points``, which grow.
 
     ``points`` are times [s], or with ``along_track`` places [m]. It is not bent at
@@ -368,7 +368,7 @@ class Harmonic:
     phase: float = 0.0
 
 
-Source = Table | Harmonic | Irregularity
+Source = Spline | Harmonic | Irregularity
 
 
 @dataclass(frozen=True)
@@ -384,10 +384,6 @@ class VehicleMotion:
     suspension: Vehicle | None = None
 
 
-# A spline of the track is followed in such steps [m].
-_FINE = 0.1
-
-
 class Motion(NamedTuple):
     """Place [m], velocity [m/s] and acceleration [m/s^2] in one direction."""
 
@@ -400,7 +396,7 @@ class Motion(NamedTuple):
 _Course = Callable[[float], tuple[float, float, float]]
 
 
-def _spline(points: Sequence[float] | np.ndarray, values: object) -> _Course:
+def _natural_spline(points: Sequence[float] | np.ndarray, values: object) -> _Course:
     from scipy.interpolate import CubicSpline  # not loaded for vehicles that stand still
 
     spline = CubicSpline(points, values, bc_type="natural")
@@ -468,19 +464,19 @@ def _course(
         rate = 2.0 * np.pi * source.frequency
         waves = (np.array([v]) for v in (source.amplitude, rate, source.phase))
         return native.sines_at.bound(*waves), False
-    if isinstance(source, Table):
+    if isinstance(source, Spline):
         if suspension is None or not source.along_track:
-            return _spline(source.points, source.values), source.along_track
-        return _spline(*_roof_course(source, direction, suspension, speed)), True
+            return _natural_spline(source.points, source.values), source.along_track
+        return _natural_spline(*_roof_above(source, direction, suspension, speed)), True
     amplitudes, wave_numbers, phases = source.waves(direction)
     if suspension is not None:
-        passed = transfer(suspension, direction, wave_numbers, speed)
+        passed = roof_transfer(suspension, direction, wave_numbers, speed)
         amplitudes, phases = amplitudes * np.abs(passed), phases + np.angle(passed)
     return native.sines_at.bound(amplitudes, wave_numbers, phases), True
 
 
-def _roof_course(
-    source: Table, direction: str, suspension: Vehicle, speed: float
+def _roof_above(
+    source: Spline, direction: str, suspension: Vehicle, speed: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places and heights of the roof above a track that follows a spline."""
     from scipy.interpolate import CubicSpline

@@ -10,7 +10,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.meshgen.geometry import divide, divisions_of, find_cuts
 from catenary.meshgen.line import Line
-from catenary.meshgen.mesh import LineMesh, assemble, names_of
+from catenary.meshgen.mesh import LineMesh, assemble
 
 # A user's mesh may differ from the scene by this much along the track [m].
 _FIT = 0.01
@@ -54,10 +54,10 @@ def make_mesh(
         write_mesh(
             line, elements_per_gap, path, support_refinement=support_refinement, grading=grading
         )
-        return read_mesh(path, names_of(line))
+        return read_mesh(path, line)
     cuts = find_cuts(line)
     divisions = divisions_of(cuts, elements_per_gap, support_refinement)
-    return assemble(divide(line, cuts, divisions, grading), names_of(line), "the line")
+    return assemble(divide(line, cuts, divisions, grading), line, "the line")
 
 
 def use_mesh(line: Line, path: Path) -> LineMesh:
@@ -73,7 +73,7 @@ def use_mesh(line: Line, path: Path) -> LineMesh:
     """
     from catenary.meshgen.reader import read_mesh
 
-    mesh = read_mesh(path, names_of(line))
+    mesh = read_mesh(path, line)
     for what, found, wanted in _places(line, mesh):
         if found.size != wanted.size:
             raise InputError(

@@ -9,10 +9,7 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.meshgen.line import Droppers, Line
 from catenary.meshgen.mesh import ANCHORS, Groups
-from catenary.meshgen.wires import End
-
-# Places closer than this along the track are one cut [m].
-SAME_CUT = 1e-6
+from catenary.meshgen.wires import SAME_PLACE, End
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,7 @@ class Cuts:
 
     def of(self, x: np.ndarray) -> np.ndarray:
         """Numbers of the cuts at positions ``x`` (n,) [m]."""
-        return np.searchsorted(self.x, np.asarray(x, dtype=float) - SAME_CUT)
+        return np.searchsorted(self.x, np.asarray(x, dtype=float) - SAME_PLACE)
 
 
 def find_cuts(line: Line) -> Cuts:
@@ -72,13 +69,13 @@ def find_cuts(line: Line) -> Cuts:
     x = np.concatenate(places)
     # Sorting is stable: of places that are one, a mast stays.
     x = x[np.argsort(x, kind="stable")]
-    x = x[np.diff(x, prepend=-np.inf) > SAME_CUT]
+    x = x[np.diff(x, prepend=-np.inf) > SAME_PLACE]
     is_mast = np.zeros(x.size, dtype=bool)
-    is_mast[np.searchsorted(x, masts - SAME_CUT)] = True
+    is_mast[np.searchsorted(x, masts - SAME_PLACE)] = True
     pieces = []
     for wire in line.wires:
         for piece in wire.pieces:
-            first, last = np.searchsorted(x, np.array([piece.x[0], piece.x[-1]]) - SAME_CUT)
+            first, last = np.searchsorted(x, np.array([piece.x[0], piece.x[-1]]) - SAME_PLACE)
             points = wire.points(x[first : last + 1])
             held = piece.ends[0] is End.HELD, piece.ends[1] is End.HELD
             pieces.append(PieceCuts(wire.name, int(first), points, held))

@@ -25,6 +25,11 @@ def read_only(values: np.ndarray) -> np.ndarray:
     return values
 
 
+def mast_places(span_lengths: Sequence[float]) -> np.ndarray:
+    """Places of the masts between spans of some lengths, anchors included, (n_spans + 1,) [m]."""
+    return np.concatenate([[0.0], np.cumsum(span_lengths)])
+
+
 @dataclass(frozen=True)
 class Spans:
     """Spans from anchor to anchor.
@@ -45,7 +50,7 @@ class Spans:
     @cached_property
     def support_positions(self) -> np.ndarray:
         """Positions of all masts, both anchors included, shape (n_spans + 1,) [m]; read-only."""
-        return read_only(np.concatenate([[0.0], np.cumsum(self.span_lengths)]))
+        return read_only(mast_places(self.span_lengths))
 
     @property
     def running_range(self) -> tuple[float, float]:

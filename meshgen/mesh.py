@@ -12,8 +12,8 @@ from itertools import combinations
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.meshgen.line import Line
-from catenary.meshgen.wires import End
+from catenary.meshgen.line import Droppers, Line
+from catenary.meshgen.wires import SAME_PLACE, End
 
 # Names of the physical groups of a simple catenary's mesh file: lines, then points.
 CONTACT_WIRE = "contact_wire"
@@ -22,7 +22,8 @@ DROPPERS = "droppers"
 STEADY_ARMS = "steady_arms"
 SUPPORTS = "supports"
 ANCHORS = "anchors"
-
+# A dropper is modelled as vertical; more lean along the track than this is a wrong mesh [m].
+_LEAN_LIMIT = 0.5
 
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -87,6 +88,10 @@ class LineMesh:
     def elements(self, wire: str) -> np.ndarray:
         """First and second node of the elements of a wire, (n, 2), in order of x."""
         return elements_of(self.wires[wire], self.breaks.get(wire, _NONE))
+
+    def middles(self, wire: str) -> np.ndarray:
+        """Middle of each element of a wire along the track, (n,) [m]."""
+        return np.asarray(self.x(self.elements(wire)).mean(axis=1))
 
     def pieces(self, wire: str) -> list[np.ndarray]:
         """Nodes of the pieces of a wire, in order of x."""
@@ -171,64 +176,6 @@ def elements_of(nodes: np.ndarray, breaks: np.ndarray = _NONE) -> np.ndarray:
     return np.delete(pairs, breaks - 1, axis=0) if breaks.size else pairs
 
 
-# Nodes closer than this are taken for one place [m].
-_SAME_PLACE = 1e-6
-
-# A dropper is modelled as vertical; more lean along the track than this is a wrong mesh [m].
-_LEAN_LIMIT = 0.5
-
-
-@dataclass(frozen=True)
-class Joins:
-    """A group of droppers: its name and the wires that it joins."""
-
-    name: str
-    upper: str
-    lower: str
-
-
-@dataclass(frozen=True)
-class Names:
-    """The physical groups of a line's mesh file, beside ``anchors``.
-
-    Attributes
-    ----------
-    wires : name -> how each of its ends is held, piece by piece, from the contact wires upwards
-    droppers : groups of droppers
-    steady_arms, supports : name -> name of the wire at which they are
-    clamps : names of upper and lower wire, and places along the track [m]; they have no group in
-        the file
-    """
-
-    wires: dict[str, tuple[bool, ...]]
-    droppers: tuple[Joins, ...]
-    steady_arms: dict[str, str]
-    supports: dict[str, str]
-    clamps: tuple[tuple[str, str, tuple[float, ...]], ...] = ()
-
-
-SIMPLE = Names(
-    {CONTACT_WIRE: (True, True), MESSENGER_WIRE: (True, True)},
-    (Joins(DROPPERS, MESSENGER_WIRE, CONTACT_WIRE),),
-    {STEADY_ARMS: CONTACT_WIRE},
-    {SUPPORTS: MESSENGER_WIRE},
-)
-
-
-def names_of(line: Line) -> Names:
-    """The groups of a line's mesh file."""
-    return Names(
-        {
-            wire.name: tuple(end is End.HELD for piece in wire.pieces for end in piece.ends)
-            for wire in line.wires
-        },
-        tuple(Joins(group.name, group.upper, group.lower) for group in line.droppers),
-        {group.name: group.wire for group in line.steady_arms},
-        {group.name: group.wire for group in line.supports},
-        tuple((group.upper, group.lower, group.x) for group in line.clamps),
-    )
-
-
 @dataclass(frozen=True)
 class Groups:
     """Contents of a mesh file.
@@ -245,15 +192,15 @@ class Groups:
     nodes: dict[str, np.ndarray]
 
 
-def assemble(groups: Groups, names: Names, source: str) -> LineMesh:
+def assemble(groups: Groups, line: Line, source: str) -> LineMesh:
     """The line mesh that the groups make. Not collective.
 
     Parameters
     ----------
     groups : Groups
         Physical groups that the file holds.
-    names : Names
-        Names of the groups.
+    line : Line
+        The line, whose wires and groups have these names; its clamps have no group in a file.
     source : str
         Name of the file, for messages.
 
@@ -263,27 +210,28 @@ def assemble(groups: Groups, names: Names, source: str) -> LineMesh:
         If the groups do not make a line; the sentence names the group and the place.
     """
     points, starts, wires = groups.points, {}, {}
-    for name, held in names.wires.items():
-        wires[name], starts[name] = _order_wire(
-            points, groups.lines[name], len(held) // 2, f"{source}: {name}"
+    for wire in line.wires:
+        wires[wire.name], starts[wire.name] = _order_wire(
+            points, groups.lines[wire.name], len(wire.pieces), f"{source}: {wire.name}"
         )
     _check_apart(points, wires, source)
     droppers = [
-        _find_droppers(points, wires, groups.lines[joins.name], joins, f"{source}: {joins.name}")
-        for joins in names.droppers
+        _find_droppers(points, wires, groups.lines[group.name], group, f"{source}: {group.name}")
+        for group in line.droppers
     ]
-    for what, hardware in (("steady arm", names.steady_arms), ("support", names.supports)):
-        for name, wire in hardware.items():
-            stray = np.setdiff1d(groups.nodes[name], wires[wire])
+    for what, hardware in (("steady arm", line.steady_arms), ("support", line.supports)):
+        for own in hardware:
+            stray = np.setdiff1d(groups.nodes[own.name], wires[own.wire])
             if stray.size:
                 raise InputError(
-                    f"{source}: the {what} at {_at(points, stray[0])} is not a node of {wire}"
+                    f"{source}: the {what} at {_at(points, stray[0])} is not a node of {own.wire}"
                 )
-    ends = [
-        _ends_of_pieces(wires[name], starts[name])[list(held)] for name, held in names.wires.items()
-    ]
+    ends = []
+    for wire in line.wires:
+        held = [end is End.HELD for piece in wire.pieces for end in piece.ends]
+        ends.append(_ends_of_pieces(wires[wire.name], starts[wire.name])[held])
     _check_anchors(points, np.concatenate(ends), groups.nodes[ANCHORS], source)
-    return _renumber(groups, names, wires, starts, droppers)
+    return _renumber(groups, line, wires, starts, droppers)
 
 
 def _ends_of_pieces(nodes: np.ndarray, starts: np.ndarray) -> np.ndarray:
@@ -326,7 +274,7 @@ def _order_wire(
         joined, np.column_stack([neighbours, neighbours + 1])
     ):
         raise InputError(_why_no_chain(points, used, degree, n_pieces, what))
-    level = np.flatnonzero(np.diff(points[nodes, 0]) < _SAME_PLACE)
+    level = np.flatnonzero(np.diff(points[nodes, 0]) < SAME_PLACE)
     if level.size:
         raise InputError(
             f"{what} does not advance along the track at {_at(points, nodes[level[0]])}"
@@ -355,14 +303,14 @@ def _why_no_chain(
 
 def _check_lengths(points: np.ndarray, edges: np.ndarray, what: str) -> None:
     length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
-    short = np.flatnonzero(length < _SAME_PLACE)
+    short = np.flatnonzero(length < SAME_PLACE)
     if short.size:
         place = _at(points, edges[short[0], 0])
         raise InputError(f"{what} has an element of zero length at {place}")
 
 
 def _find_droppers(
-    points: np.ndarray, wires: dict[str, np.ndarray], edges: np.ndarray, joins: Joins, what: str
+    points: np.ndarray, wires: dict[str, np.ndarray], edges: np.ndarray, joins: Droppers, what: str
 ) -> np.ndarray:
     """Upper and lower node of each dropper in order of x, (n, 2); chains are shortened to ends."""
     _check_lengths(points, edges, what)
@@ -388,7 +336,7 @@ def _find_droppers(
 
 
 def _ends_of_chains(
-    points: np.ndarray, on_wire: np.ndarray, edges: np.ndarray, joins: Joins, what: str
+    points: np.ndarray, on_wire: np.ndarray, edges: np.ndarray, joins: Droppers, what: str
 ) -> np.ndarray:
     """Follow chains of elements from wire node to wire node, (n, 2)."""
     if on_wire[edges].all():
@@ -426,10 +374,10 @@ def _ends_of_chains(
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
-def _check_droppers(points: np.ndarray, ends: np.ndarray, joins: Joins, what: str) -> None:
+def _check_droppers(points: np.ndarray, ends: np.ndarray, joins: Droppers, what: str) -> None:
     """Refuse droppers that stand upside down, lean too far or lie on one another."""
     across = points[ends[:, 0]] - points[ends[:, 1]]
-    inverted = np.flatnonzero(across[:, 2] < _SAME_PLACE)
+    inverted = np.flatnonzero(across[:, 2] < SAME_PLACE)
     if inverted.size:
         raise InputError(
             f"{what}: the dropper at {_at(points, ends[inverted[0], 1])} does not hang down: its "
@@ -464,7 +412,7 @@ def _check_anchors(points: np.ndarray, ends: np.ndarray, anchors: np.ndarray, so
 
 def _renumber(
     groups: Groups,
-    names: Names,
+    line: Line,
     wires: dict[str, np.ndarray],
     starts: dict[str, np.ndarray],
     droppers: list[np.ndarray],
@@ -475,7 +423,7 @@ def _renumber(
     narrow band and their parts few neighbours.
     """
     points = groups.points
-    used = np.concatenate([wires[name] for name in reversed(names.wires)])
+    used = np.concatenate([wires[wire.name] for wire in reversed(line.wires)])
     # x is rounded so that nodes of one station stay together whatever their last bits say.
     order = used[np.argsort(np.round(points[used, 0], 6), kind="stable")]
     number = np.full(points.shape[0], -1)
@@ -492,11 +440,11 @@ def _renumber(
         return number[nodes[by_x]], group[by_x]
 
     hanging, dropper_group = along(droppers, (0, 2))
-    arms, arm_group = along([groups.nodes[name] for name in names.steady_arms])
-    supports, support_group = along([groups.nodes[name] for name in names.supports])
+    arms, arm_group = along([groups.nodes[arms.name] for arms in line.steady_arms])
+    supports, support_group = along([groups.nodes[own.name] for own in line.supports])
     clamps = [
-        np.column_stack([_nearest(points, wires[name], x) for name in (upper, lower)])
-        for upper, lower, x in names.clamps
+        np.column_stack([_nearest(points, wires[name], own.x) for name in (own.upper, own.lower)])
+        for own in line.clamps
     ]
     return LineMesh(
         points=points[order],

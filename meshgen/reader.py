@@ -13,7 +13,8 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.files import is_file
-from catenary.meshgen.mesh import ANCHORS, SIMPLE, Groups, LineMesh, Names, assemble
+from catenary.meshgen.line import Line
+from catenary.meshgen.mesh import ANCHORS, Groups, LineMesh, assemble
 
 # A mesh of four million nodes takes half of it.
 MOST_BYTES = 500_000_000
@@ -22,7 +23,7 @@ _SHOWN, _SOME = 60, 12  # of the names of groups that a file has
 _KINDS = {0: "points", 1: "lines", 2: "surfaces", 3: "volumes"}
 
 
-def read_mesh(path: Path, names: Names = SIMPLE) -> LineMesh:
+def read_mesh(path: Path, line: Line) -> LineMesh:
     """The line mesh of a ``.msh`` file (MSH 2.2 or 4.1), checked. Not collective: one rank reads.
 
     Numbering and orientation of nodes and elements in the file do not matter; a dropper may
@@ -32,12 +33,11 @@ def read_mesh(path: Path, names: Names = SIMPLE) -> LineMesh:
     Parameters
     ----------
     path : Path
-        File with the physical groups of ``names``: lines for wires and droppers, points for
-        hardware and ``anchors``. Droppers, arms and supports may have no members, but must
-        be named.
-    names : Names, optional
-        The groups; by default those of a simple catenary, which are ``contact_wire``,
-        ``messenger_wire``, ``droppers``, ``steady_arms``, ``supports``.
+        File with a physical group for each wire and group of the line, by its name: lines for
+        wires and droppers, points for hardware and ``anchors``. Droppers, arms and supports may
+        have no members, but must be named.
+    line : Line
+        The line.
 
     Raises
     ------
@@ -46,10 +46,11 @@ def read_mesh(path: Path, names: Names = SIMPLE) -> LineMesh:
         one sentence with the file's name and the place.
     """
     content = _load(path)
-    full = (*names.wires, ANCHORS)
+    wires = [wire.name for wire in line.wires]
+    full = (*wires, ANCHORS)
     groups = (
-        (*names.steady_arms, *names.supports, ANCHORS),
-        (*names.wires, *(joins.name for joins in names.droppers)),
+        (*(own.name for own in line.hardware), ANCHORS),
+        (*wires, *(own.name for own in line.droppers)),
     )
     nodes, lines = (
         {name: _members(content, name, dimension, path, name not in full) for name in wanted}
@@ -58,7 +59,7 @@ def read_mesh(path: Path, names: Names = SIMPLE) -> LineMesh:
     points = np.ascontiguousarray(content.points, dtype=float)
     if points.shape[1] != 3 or not np.isfinite(points).all():
         raise InputError(f"{path}: the nodes must have three finite coordinates each")
-    return assemble(Groups(points, lines, nodes), names, str(path))
+    return assemble(Groups(points, lines, nodes), line, str(path))
 
 
 def _load(path: Path) -> meshio.Mesh:

@@ -36,9 +36,11 @@ import numpy as np
 from scipy import fft
 
 from catenary.base.errors import InputError
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.kernels import native
 from catenary.solver.model.matrices import iterate_sums
 from catenary.solver.model.model import Model
+from catenary.solver.model.unknowns import LEVEL, wire_of_node
 from catenary.solver.problem.integrator_parameters import Integration
 
 # Coupling over diagonal at which the rest of a half line is round-off, squared in another pass; and
@@ -46,6 +48,16 @@ from catenary.solver.problem.integrator_parameters import Integration
 _ROUND_OFF, _MOST_PASSES = 1e-9, 40
 # Unknowns that an element may join, twice a station's: four in lateral motion of six wires.
 _MOST_WIDE = 47
+# Difference of two spans of a kind, over the largest entry: dropper lengths differ by millimetres
+# where a line ends.
+_ALIKE = 0.02
+# Radius^(2 n) of the circle for n numbers: what aliases, and the square of what round-off grows by.
+_ALIASED = 1e-12
+# Frequencies at a time.
+_AT_ONCE = 1024
+
+START, END = 0, 1
+SIDES = ("start", "end")
 
 
 class SpanMatrices(NamedTuple):
@@ -160,18 +172,6 @@ def half_lines(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
     raise InputError("what acts on one of its cross-sections does not fade along it")
 
 
-# Difference of two spans of a kind, over the largest entry: dropper lengths differ by millimetres
-# where a line ends.
-_ALIKE = 0.02
-_TINY = 1e-6  # [m]
-
-# Unknowns that have the other sign in a mirror image.
-_LATERAL = ("v", "theta_z")
-
-START, END = 0, 1
-SIDES = ("start", "end")
-
-
 class LineBeyond(NamedTuple):
     """Half line beyond an end.
 
@@ -212,7 +212,7 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
         raise InputError(f"{where}, but the line has less than 3 spans (line.n_spans)")
     # From inside to the end: the span that is repeated, and the last one.
     marks = [masts[n - 2], masts[n - 1], masts[n]] if side == END else list(masts[2::-1])
-    if abs(abs(marks[1] - marks[0]) - abs(marks[2] - marks[1])) > _TINY:
+    if abs(abs(marks[1] - marks[0]) - abs(marks[2] - marks[1])) > SAME_PLACE:
         raise InputError(
             f"{where}: that has {abs(marks[1] - marks[0]):g} m and the last one "
             f"{abs(marks[2] - marks[1]):g} m; give both one length"
@@ -296,8 +296,9 @@ def _without(whole: np.ndarray, first: int, held: np.ndarray) -> tuple[np.ndarra
 
 
 def sideways(model: Model, unknowns: np.ndarray) -> np.ndarray:
-    """-1 for lateral ones of some ``unknowns`` (m,), 1 for others. Not collective."""
-    names = [name for name in _LATERAL if name in model.unknowns]
+    """-1 for lateral ones of some ``unknowns`` (m,), which have the other sign in a mirror image,
+    1 for others. Not collective."""
+    names = [name for name in LEVEL if name in model.unknowns]
     every = np.arange(model.mesh.n_nodes)
     lateral = [model.dofs(every[model.numbering.has(every, name)], name) for name in names]
     found = np.isin(unknowns, np.concatenate([np.zeros(0, int), *lateral]))
@@ -335,10 +336,7 @@ def _difference(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def _places(model: Model, unknowns: np.ndarray) -> list[tuple[int, str]]:
-    numbers, found = model.numbering.numbers, []
-    wire_of = np.full(model.mesh.n_nodes, -1)
-    for number, nodes in enumerate(model.mesh.wires.values()):
-        wire_of[nodes] = number
+    numbers, wire_of, found = model.numbering.numbers, wire_of_node(model.mesh), []
     for unknown in unknowns.tolist():
         nodes, columns = np.nonzero(numbers == unknown)
         found += [(int(wire_of[n]), model.unknowns[c]) for n, c in zip(nodes, columns, strict=True)]
@@ -355,12 +353,6 @@ def _matrices(model: Model, first: int, last: int, low: int, high: int) -> np.nd
         for matrix, own in zip(result, values[:, near], strict=True):
             np.add.at(matrix, at, own)
     return result
-
-
-# Radius^(2 n) of the circle for n numbers: what aliases, and the square of what round-off grows by.
-_ALIASED = 1e-12
-# Frequencies at a time.
-_AT_ONCE = 1024
 
 
 @dataclass(frozen=True)

@@ -49,6 +49,11 @@ from catenary.solver.statics.rest_nearby import StiffLine
 from catenary.solver.time_loop.compiled_steps import step_parts
 from catenary.solver.time_loop.prepared_line import make_room, stepped_by_kernels
 
+# Steps whose least time tells how many lanes are quickest.
+_TRIALS = 10
+# Steps between two looks at signals.
+_MOST_STEPS = 4096
+
 
 class TautLine(NamedTuple):
     """A line at rest, with displacements from the shape that it would have if droppers could push.
@@ -256,10 +261,6 @@ class SharedLine:
         self.line.destroy()
 
 
-# Steps whose least time tells how many lanes are quickest.
-_TRIALS = 10
-
-
 def _quickest(passes: StationPasses, n_scenes: int) -> int:
     """Number of lanes in which a step of ``n_scenes`` takes least time a scene on this processor.
 
@@ -310,10 +311,6 @@ def why_alone(problem: Problem) -> str:
     if problem.incidents:
         return "incidents change its line on the way"
     return ""
-
-
-# Steps between two looks at signals.
-_MOST_STEPS = 4096
 
 
 class SceneHistory(NamedTuple):

@@ -39,7 +39,8 @@ from catenary.solver.kernels import native
 from catenary.solver.model import beam
 from catenary.solver.model.alike import alike
 from catenary.solver.model.loads import FieldLoad
-from catenary.solver.model.model import Block, Model, wire_elements
+from catenary.solver.model.model import Block, Model
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.problem.problem import Placement, Problem, Simulated
 from catenary.solver.problem.wind import Wind
 
@@ -47,6 +48,15 @@ from catenary.solver.problem.wind import Wind
 PEAK = 3.5
 # Parts of a gust: along the mean wind, across it to the left, upward.
 ALONG, ACROSS, UPWARD = range(3)
+# Bands: below this frequency [Hz] so many to a factor of ten, from there on so wide [Hz].
+_EVEN_FROM, _PER_DECADE, _WIDTH = 0.1, 30, 0.01
+# Points from post to post, and stretches between posts that are kept.
+POSTS, _KEPT = 64, 96
+# Slices in a period of the highest frequency. Linear between them, a wave loses part of itself.
+_SLICES = 5
+
+# Time between slices [s], between which a pressure is linear, and what fills these.
+_Fill = tuple[float, Callable[[int, slice, np.ndarray], None]]
 
 
 def variance_below(wind: Wind, part: int) -> Callable[[np.ndarray], np.ndarray]:
@@ -82,14 +92,6 @@ def variance_below(wind: Wind, part: int) -> Callable[[np.ndarray], np.ndarray]:
         return np.asarray(6.0 * square * (1.0 - (1.0 + x**2) ** (-1.0 / 3.0)))
 
     return davenport
-
-
-# Bands: below this frequency [Hz] so many to a factor of ten, from there on so wide [Hz].
-_EVEN_FROM, _PER_DECADE, _WIDTH = 0.1, 30, 0.01
-# Points from post to post, and stretches between posts that are kept.
-POSTS, _KEPT = 64, 96
-# Slices in a period of the highest frequency. Linear between them, a wave loses part of itself.
-_SLICES = 5
 
 
 class GustField:
@@ -339,7 +341,7 @@ def airflow(problem: Problem, simulated: Simulated, placement: Placement) -> Air
     )
 
 
-def along(
+def forces_along(
     model: Model, wire: str, unknowns: tuple[str, str], points: np.ndarray | None = None
 ) -> tuple[np.ndarray, sparse.csr_matrix]:
     """Unknowns (n,) of a wire in a plane, and work-equivalent forces (n, n_points) of unit loads.
@@ -359,7 +361,7 @@ def along(
     points : ndarray, shape (n_points,), optional
         Ascending places [m]; the wire's nodes if not given.
     """
-    dofs, length = wire_elements(model, wire, unknowns)
+    dofs, length = model.wire_elements(wire, unknowns)
     nodes = model.mesh.wires[wire]
     number = np.empty(model.mesh.n_nodes, dtype=np.int64)
     number[nodes] = np.arange(nodes.size)
@@ -389,14 +391,11 @@ def _interpolation(x: np.ndarray, points: np.ndarray) -> sparse.csr_matrix:
     ).tocsr()
 
 
-VERTICAL, LATERAL = ("w", "theta_y"), ("v", "theta_z")
-
-
 def planes_of(model: Model, wire: str) -> tuple[tuple[str, str], ...]:
     """Planes in which a wire moves, as pairs of unknowns."""
     nodes = model.mesh.wires[wire]
-    lateral = bool(model.numbering.has(nodes, LATERAL[0]).all())
-    return (VERTICAL, LATERAL) if lateral else (VERTICAL,)
+    level = bool(model.numbering.has(nodes, LEVEL[0]).all())
+    return (UPRIGHT, LEVEL) if level else (UPRIGHT,)
 
 
 def damping_blocks(model: Model, wind: Wind) -> list[Block]:
@@ -404,10 +403,10 @@ def damping_blocks(model: Model, wind: Wind) -> list[Block]:
     tunnels, found = model.problem.tunnels, []
     for wire in model.problem.line.wires:
         for plane in planes_of(model, wire.name):
-            dofs, length = wire_elements(model, wire.name, plane)
-            middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+            dofs, length = model.wire_elements(wire.name, plane)
+            middle = model.mesh.middles(wire.name)
             speed = np.abs(across_at(wind, tunnels, middle))
-            share = 1.0 if plane is LATERAL else 0.5
+            share = 1.0 if plane is LEVEL else 0.5
             rate = share * wind.density * drag_width(wire) * speed
             first, kind = alike(np.column_stack([length, rate]))
             matrices = beam.mass(length[first], rate[first])
@@ -422,13 +421,13 @@ def gust_loads(model: Model, wind: Wind) -> list[FieldLoad]:
     x = model.mesh.points[:, 0]
     points = gust_points(gusts.spacing, float(x.min()), float(x.max()))
     pressures = {
-        VERTICAL: upward_pressure(model, wind, points),
-        LATERAL: _lateral(model, wind, points),
+        UPRIGHT: upward_pressure(model, wind, points),
+        LEVEL: _leftward_pressure(model, wind, points),
     }
     found = []
     for plane, (interval, fill) in pressures.items():
         parts = [
-            (*along(model, wire.name, plane, points), drag_width(wire))
+            (*forces_along(model, wire.name, plane, points), drag_width(wire))
             for wire in model.problem.line.wires
             if plane in planes_of(model, wire.name)
         ]
@@ -437,9 +436,6 @@ def gust_loads(model: Model, wind: Wind) -> list[FieldLoad]:
             weights = sparse.vstack([width * weights for _, weights, width in parts]).tocsr()
             found.append(FieldLoad(unknowns, weights, interval, fill))
     return found
-
-
-_Fill = tuple[float, Callable[[int, slice, np.ndarray], None]]
 
 
 def upward_pressure(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
@@ -479,7 +475,7 @@ def upward_pressure(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
     return upward.interval, fill
 
 
-def _lateral(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
+def _leftward_pressure(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
     """Force of gusts to the left over diameter times drag coefficient [N/m2]."""
     mean = across_at(wind, model.problem.tunnels, points)
     exposed = gust_exposure(wind, points, model.problem.tunnels)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from catenary.base.process import SETTINGS
+from catenary.base.process import MPI_SETTINGS
 
 OK, MISSING, BROKEN = "OK", "missing", "broken"
 # No part answers later than this on a machine that works [s].
@@ -142,7 +142,7 @@ def _answer(command: list[str], *, launches: bool = False) -> tuple[int, str]:
     ):
         environment = (
             os.environ
-            | ({} if launches else SETTINGS)
+            | ({} if launches else MPI_SETTINGS)
             | {
                 "OMPI_ALLOW_RUN_AS_ROOT": "1",
                 "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",

@@ -116,11 +116,11 @@ def start_petsc(arguments: Sequence[str]) -> None:
     """
     import petsc4py
 
-    from catenary.base.process import python_signals_kept, settings
+    from catenary.base.process import mpi_settings, python_signals_kept
 
     running = "petsc4py.PETSc" in sys.modules
     try:
-        with python_signals_kept(), settings():
+        with python_signals_kept(), mpi_settings():
             petsc4py.init(["catenary", "-skip_petscrc", *arguments])
     except RuntimeError as error:  # an error of PETSc, which prints its cause by itself
         raise InputError(

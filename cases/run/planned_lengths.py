@@ -21,8 +21,7 @@ from catenary.cases.scene.input.csv_files import (
 from catenary.cases.scene.load import read_draft
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.scene.starter import DROPPERS_FILE
-from catenary.meshgen.geometry import SAME_CUT
-from catenary.meshgen.wires import Role
+from catenary.meshgen.wires import SAME_PLACE, Role
 from catenary.solver.statics.form_finding import lengths_to_cut
 
 LENGTH = "length_m"
@@ -126,6 +125,6 @@ def _lengths(scene: Scene, rows: Sequence[tuple[int, dict[str, float]]]) -> np.n
     masts = line.support_positions
     wanted = np.array([masts[span - 1] + row["position_m"] for span, row in rows])
     order = np.argsort(x, kind="stable")
-    at = order[np.minimum(np.searchsorted(x[order], wanted - SAME_CUT), order.size - 1)]
-    assert np.allclose(x[at], wanted, rtol=0.0, atol=SAME_CUT)
+    at = order[np.minimum(np.searchsorted(x[order], wanted - SAME_PLACE), order.size - 1)]
+    assert np.allclose(x[at], wanted, rtol=0.0, atol=SAME_PLACE)
     return np.asarray(lengths[chosen[at]])

@@ -19,8 +19,8 @@ from catenary.meshgen.mesh import LineMesh
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from catenary.solver.model.rest_shape import Equilibrium
     from catenary.solver.problem.problem import Problem
-    from catenary.solver.statics.form_finding import Equilibrium
 
 # Suffixes of drawings.
 DRAWN = (".png", ".svg")

@@ -323,7 +323,7 @@ def _train(scene: Scene) -> Train:
     for number, place in enumerate(scene.train.pantographs, start=1):
         kind = scene.pantographs[place.name]
         force = static_force(place.name, kind, scene.train.speed_km_h)
-        assert force is not None  # checks/pantographs.py has refused speeds outside the table
+        assert force is not None  # ``check_pantographs`` has refused speeds outside the table
         placements.append(
             Placement(
                 data=pantograph_of(

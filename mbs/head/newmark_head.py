@@ -11,7 +11,7 @@ import numpy as np
 from catenary.mbs.head.laws import Controller, Law, Regulation, Regulator, in_place
 from catenary.mbs.head.stepping import Part, Raising, Stepping
 from catenary.mbs.head.strips import HeadParts
-from catenary.mbs.interface import N_DRIVE, HeadState, drive_width, named
+from catenary.mbs.interface import N_DRIVE, HeadState, drive_width, drives_by_name
 from catenary.solver.kernels import native
 
 # A step that takes no time: what it finds are the accelerations of the state as it is.
@@ -25,7 +25,7 @@ class SteppedHead(ABC):
     ----------
     stepped : the compiled head, for steps from Python and in the loop of kernels
     head : HeadState, what it predicted last
-    row : inputs of the coming step, see `drives`
+    row : inputs of the coming step, see `interface.drives_by_name`
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class SteppedHead(ABC):
             self._touch, self._state, self.head.numbers, self._newmark, roll
         )
         self.row = np.zeros(drive_width(s))
-        self._rows = named(self.row[None])
+        self._rows = drives_by_name(self.row[None])
         # The time of what is in it, and when that stays as it is.
         self._driven = -np.inf
         self._settled = raise_time if steady_air and self._base is None else np.inf
@@ -228,7 +228,7 @@ class SteppedHead(ABC):
         ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with; of heads
         that roll or bend it has what is known of where wires cross their strips.
         """
-        self._put_drives(times, named(drives))
+        self._put_drives(times, drives_by_name(drives))
         if self._lateral is not None:
             s = len(self.strip_offsets)
             self._lateral.fill_ahead(times, drives[:, N_DRIVE : N_DRIVE + 2 * s])

@@ -75,7 +75,7 @@ class FullPantograph:
         ``nominal_height`` [m]: the static force, and what the air lifts the arm with
     stepping : Stepping; without a ``lateral`` the wire crosses the strips in their middle
     air : forces of the air; without it there are none
-    handling : way of keeping constraints, or its name in `step_solvers.METHODS`
+    handling : way of keeping constraints, or its name in `implicit_steps.METHODS`
     substeps : into how many a step is cut
 
     Raises

@@ -28,7 +28,7 @@ from catenary.mbs.rigid.statics import (
     equilibrium,
     unheld_force,
 )
-from catenary.mbs.rigid.system import Miss, System, least_squares
+from catenary.mbs.rigid.system import Miss, System, bodies_on, least_squares
 
 logger = logging.getLogger("catenary.multibody")
 
@@ -57,7 +57,7 @@ ROLL, PITCH = 0, 1
 @dataclass(frozen=True)
 class AllBodies:
     """Integration of all bodies in the time loop: joints kept by ``handling``, one of
-    `step_solvers.METHODS`, in so many ``substeps`` of the line's step."""
+    `implicit_steps.METHODS`, in so many ``substeps`` of the line's step."""
 
     handling: str = "coordinate_partitioning"
     substeps: int = 1
@@ -75,7 +75,7 @@ class MultibodyData:
     force is measured; ``strips`` are parts of the head.
     ``all_bodies`` has all bodies in the time loop; with None the mechanism is reduced to tables.
     ``laws`` that are not linear act on head (0) and arm (1) besides. ``crosswind_factor`` is what
-    a cross wind counts in the air's speed (`air.airflow`).
+    a cross wind counts in the air's speed (`wind.airflow`).
     """
 
     name: str
@@ -350,20 +350,14 @@ def describe_assembly(missed: tuple[Miss, ...]) -> str:
 def without_head(data: MultibodyData, system: System) -> System:
     """The mechanism that raises the arm, without the head and its suspension."""
     bodies = tuple(body for body in system.bodies if body.name != data.head)
-    joints = tuple(joint for joint in system.joints if data.head not in _joined(joint))
+    joints = tuple(joint for joint in system.joints if data.head not in bodies_on(joint))
     forces: list[Force] = []
     for force in system.forces:
         if isinstance(force, Gravity):
             forces.append(replace(force, masses=tuple(body.mass for body in bodies)))
-        elif data.head not in _joined(force):
+        elif data.head not in bodies_on(force):
             forces.append(force)
     return System(bodies, joints, tuple(forces))
-
-
-def _joined(what: Joint | Force) -> tuple[str, ...]:
-    """Names of the bodies that a joint or force is on."""
-    names = (getattr(what, key, None) for key in ("i", "j", "body"))
-    return tuple(name for name in names if name is not None)
 
 
 def _part(motion: Motion, system: System) -> Motion:
@@ -387,7 +381,7 @@ def _head(data: MultibodyData, system: System, holder: Joint, motion: Motion) ->
         ) from error
     stiffness = -float(np.polyfit(around - rest, tables.lifts, 1)[0])
     # Forces on the head alone: its weight, and forces at its points.
-    own = [force for force in held.other_forces if data.arm not in _joined(force)]
+    own = [force for force in held.other_forces if data.arm not in bodies_on(force)]
     pull = float(np.sum([f.generalised(motion, 0.0)[6 * number + 2] for f in own]))
     return Head(
         mass=float(tables.masses[2]),
@@ -404,21 +398,21 @@ def _judge_head(data: MultibodyData) -> None:
     """Raise ``InputError`` unless the head hangs on the arm alone, on linear springs."""
     allowed = {data.head, data.arm}
     for joint in data.system.joints:
-        on = set(_joined(joint))
+        on = set(bodies_on(joint))
         if data.head in on and on != allowed:
             other = ", ".join(sorted(on - allowed)) or "space"
             raise InputError(
                 f"its joint {joint.name!r} ties the head {data.head!r} to {other}; only the arm "
                 f"{data.arm!r} may carry it"
             )
-    if not any(set(_joined(joint)) == allowed for joint in data.system.joints):
+    if not any(set(bodies_on(joint)) == allowed for joint in data.system.joints):
         raise InputError(
             f"its head {data.head!r} is guided by no joint on its arm {data.arm!r}; there must be "
             "one that lets it slide, such as revolute_prismatic"
         )
     springs = 0
     for force in data.system.forces:
-        on = set(_joined(force))
+        on = set(bodies_on(force))
         if data.head not in on or len(on) == 1:
             continue
         if on != allowed:
@@ -467,7 +461,7 @@ def _judge_raising(data: MultibodyData, motion: Motion) -> None:
             "less"
         )
     left = unheld_force(held, there)
-    if left > ADRIFT * 9.81 * sum(body.mass for body in frame.bodies):
+    if left > ADRIFT * Gravity.acceleration * sum(body.mass for body in frame.bodies):
         raise InputError(
             f"its mechanism has more than one way to move: with the arm {data.arm!r} held at its "
             f"height, forces of {left:.3g} N (or N m) still move it; join its bodies further"

@@ -48,14 +48,17 @@ from scipy import linalg
 
 from catenary.base.errors import NotConverged, RunBroken
 from catenary.mbs.rigid.bodies import Motion, Quantity
-from catenary.mbs.rigid.system import System, independent_rows
+from catenary.mbs.rigid.system import CLOSED, System, closed_within, independent_rows
 
 # Generalised forces (6 n, s) of unit forces at a motion.
 Ways = Callable[[Motion], np.ndarray]
 
-# Largest error of a row that is left [m, cosine; 1/s], where errors are removed.
-TOLERANCE = 1e-12
+# Removals of the errors of joints after a step, at most.
 MAX_REMOVALS = 8
+# A pivot of dependent coordinates below this part of the largest one: others are chosen.
+WORN = 1e-4
+# Change of a right side's solution that ends the augmented Lagrangian, over its size.
+_SETTLED = 1e-12
 
 
 class Prediction(NamedTuple):
@@ -91,7 +94,7 @@ class Stepper:
     ----------
     system : System
     dt : length of a step [s]
-    solver : way of keeping constraints, or its name in `step_solvers.METHODS`
+    solver : way of keeping constraints, or its name in ``METHODS``
     ways : generalised forces of unit forces that are given step by step; none if left out
     substeps : into how many a step is cut
     beta, gamma : Newmark's parameters
@@ -235,7 +238,7 @@ class Stepper:
             rows = self.system.constraints(motion.with_velocities(velocities), time)
             error = rows.rate
             for _ in range(MAX_REMOVALS):
-                if np.abs(error).max() <= TOLERANCE * (1.0 + np.abs(velocities).max()):
+                if np.abs(error).max() <= CLOSED * (1.0 + np.abs(velocities).max()):
                     break
                 step = self._solver.removal(error)
                 velocities = velocities + step
@@ -250,7 +253,7 @@ class Stepper:
 
     def _closed(self, motion: Motion, time: float) -> Motion:
         """Errors of places removed with the rows of the prediction, which are nearly the same."""
-        limit = TOLERANCE * max(1.0, float(np.abs(motion.position).max()))
+        limit = closed_within(motion)
         for _ in range(MAX_REMOVALS):
             errors = self.system.constraints(motion, time).value
             if np.abs(errors).max() <= limit:
@@ -260,10 +263,6 @@ class Stepper:
             f"The joints of the multibody system cannot be kept closed at {time:g} s: they are "
             f"open by {float(np.abs(errors).max()):.2g} m; take shorter steps."
         )
-
-
-# A pivot of dependent coordinates below this part of the largest one: others are chosen.
-WORN = 1e-4
 
 
 class StepSolver(Protocol):
@@ -374,10 +373,8 @@ class Augmented(_Multipliers):
 
     feedback: float | None = None
 
-    def __init__(
-        self, penalty: float = 1e8, tolerance: float = 1e-12, max_iterations: int = 30
-    ) -> None:
-        self.penalty, self.tolerance, self.max_iterations = penalty, tolerance, max_iterations
+    def __init__(self, penalty: float = 1e8, max_iterations: int = 30) -> None:
+        self.penalty, self.max_iterations = penalty, max_iterations
 
     def factor(self, operator: np.ndarray, jacobian: np.ndarray) -> None:
         """(A + a J^T J)^-1 a J^T as A^-1 J^T (1 / a + J A^-1 J^T)^-1, which loses no digits."""
@@ -405,7 +402,7 @@ class Augmented(_Multipliers):
             change = change + step
             # Each right side by its own size: unit forces move far less than accelerations.
             size = np.abs(change).max(axis=0)
-            if (np.abs(step).max(axis=0) <= self.tolerance * size).all():
+            if (np.abs(step).max(axis=0) <= _SETTLED * size).all():
                 return change
         raise NotConverged(
             "The augmented Lagrangian does not converge within a step: choose another penalty "

@@ -50,10 +50,13 @@ from catenary.solver.kernels import native
 
 # A row of Phi_q that the rows before it explain but for this part of its length is redundant.
 DEPENDENT = 1e-8
-# Error of a row of a joint that is closed [m, cosine], within 1 m of the origin.
-_CLOSED = 1e-12
+# Error of a row of a joint that is closed [m, cosine; 1/s], within 1 m of the origin.
+CLOSED = 1e-12
 # Of Newton's method that closes joints.
 _MOST_ITERATIONS = 30
+_ACROSS_TRACK, _ALONG_TRACK = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+# A link closer than this to the direction across the track (a sine) is measured along it.
+_CLOSE = 0.1
 
 
 class Miss(NamedTuple):
@@ -69,6 +72,12 @@ class Accelerations(NamedTuple):
 
     acceleration: np.ndarray
     multipliers: np.ndarray
+
+
+def closed_within(motion: Motion) -> float:
+    """Error of a row of a joint that is closed [m, cosine]: what round-off allows, which grows with
+    the distance from the origin."""
+    return CLOSED * max(1.0, float(np.abs(motion.position).max()))
 
 
 def independent_rows(jacobian: np.ndarray) -> np.ndarray:
@@ -245,8 +254,7 @@ class System:
         """
         if not self.joints:
             return motion
-        # What round-off allows, which grows with the distance from the origin.
-        limit = _CLOSED * max(1.0, float(np.abs(motion.position).max()))
+        limit = closed_within(motion)
         for _ in range(_MOST_ITERATIONS + 1):
             rows = self.constraints(motion, time)
             if np.abs(rows.value).max() <= limit:
@@ -283,6 +291,12 @@ class System:
         return motion.with_velocities(velocities)
 
 
+def bodies_on(what: Joint | Force) -> tuple[str, ...]:
+    """Names of the bodies that a joint or force is on."""
+    names = (getattr(what, key, None) for key in ("i", "j", "body"))
+    return tuple(name for name in names if name is not None)
+
+
 def least_squares(matrix: np.ndarray, right: np.ndarray, cond: float) -> np.ndarray:
     """The smallest x (n,) or (n, k) for which ``matrix`` (m, n) x is nearest to ``right``.
 
@@ -311,60 +325,55 @@ def null_space(matrix: np.ndarray) -> np.ndarray:
 def turned_round(system: System) -> System:
     """Return a system after half a turn about the z axis of space. Not collective."""
     return System(
-        tuple(_body(body) for body in system.bodies),
-        tuple(_joint(joint) for joint in system.joints),
-        tuple(_force(force) for force in system.forces),
+        tuple(_turned_body(body) for body in system.bodies),
+        tuple(_turned_joint(joint) for joint in system.joints),
+        tuple(_turned_force(force) for force in system.forces),
     )
 
 
-def _across(vector: Vector) -> tuple[float, float, float]:
+def _turned_vector(vector: Vector) -> tuple[float, float, float]:
     """A vector of space after half a turn."""
     x, y, z = (float(value) for value in vector)
     return (-x, -y, z)
 
 
-def _parameters(parameters: np.ndarray) -> tuple[float, ...]:
+def _turned_parameters(parameters: np.ndarray) -> tuple[float, ...]:
     """Euler parameters (4,) of an orientation in space after half a turn, e0 >= 0."""
     e0, e1, e2, e3 = (float(value) for value in parameters)
     after = (-e3, -e2, e1, e0)
     return tuple(-value for value in after) if after[0] < 0.0 else after
 
 
-def _body(body: Body) -> Body:
-    turn = _parameters(body.parameters)[1:]
-    return replace(body, position=_across(body.position), turn=turn)
+def _turned_body(body: Body) -> Body:
+    turn = _turned_parameters(body.parameters)[1:]
+    return replace(body, position=_turned_vector(body.position), turn=turn)
 
 
-def _joint(joint: Joint) -> Joint:
+def _turned_joint(joint: Joint) -> Joint:
     if isinstance(joint, PointOnCurve):
         # Curves are given for growing x.
         x, y = (tuple(-float(v) for v in reversed(values)) for values in (joint.x, joint.y))
         return replace(joint, x=x, y=y, z=tuple(reversed(tuple(joint.z))))
     if isinstance(joint, PrescribedPoint):
-        return replace(joint, along=_across(joint.along))
+        return replace(joint, along=_turned_vector(joint.along))
     changes = _in_space(joint)
     if isinstance(joint, Fixed) and joint.i == SPACE:
-        changes["parameters"] = _parameters(np.asarray(joint.parameters, dtype=float))
+        changes["parameters"] = _turned_parameters(np.asarray(joint.parameters, dtype=float))
     return replace(joint, **changes)  # type: ignore[type-var]
 
 
-def _force(force: Force) -> Force:
+def _turned_force(force: Force) -> Force:
     return replace(force, **_in_space(force)) if isinstance(force, BetweenPoints) else force
 
 
 def _in_space(what: Any) -> dict[str, Any]:
     """Points and axes of a joint or force that are those of space, after half a turn."""
     return {
-        field.name: _across(getattr(what, field.name))
+        field.name: _turned_vector(getattr(what, field.name))
         for field in fields(what)
         for end in ("i", "j")
         if field.name.endswith(f"_{end}") and getattr(what, end) == SPACE
     }
-
-
-_ACROSS, _ALONG = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
-# A link closer than this to the direction across the track (a sine) is measured along it.
-_CLOSE = 0.1
 
 
 def without_spins(system: System, motion: Motion) -> System:
@@ -381,18 +390,12 @@ def without_spins(system: System, motion: Motion) -> System:
     motion : Motion
         Assembled motion, whose spins are kept.
     """
-    holders = [
-        holder for body in system.bodies if (holder := _holder(system, body, motion)) is not None
-    ]
-    return system.with_joints(*holders)
+    locks = (_spin_lock(system, body, motion) for body in system.bodies)
+    return system.with_joints(*(lock for lock in locks if lock is not None))
 
 
-def _holder(system: System, body: Body, motion: Motion) -> PrescribedAngle | None:
-    joints = [
-        joint
-        for joint in system.joints
-        if body.name in (getattr(joint, key, None) for key in ("i", "j", "body"))
-    ]
+def _spin_lock(system: System, body: Body, motion: Motion) -> PrescribedAngle | None:
+    joints = [joint for joint in system.joints if body.name in bodies_on(joint)]
     if len(joints) != 2 or not all(isinstance(joint, Spherical) for joint in joints):
         return None
     ends = [
@@ -405,21 +408,20 @@ def _holder(system: System, body: Body, motion: Motion) -> PrescribedAngle | Non
     length = float(np.linalg.norm(line))
     if length == 0.0:
         return None
-    fixed = _ACROSS
+    fixed = _ACROSS_TRACK
     if np.linalg.norm(np.cross(line / length, fixed)) < _CLOSE:
-        fixed = _ALONG
+        fixed = _ALONG_TRACK
     side = np.cross(line, fixed)
     side /= np.linalg.norm(side)
     # The angle zero of `PrescribedAngle` about an axis a with a normal n has the row
     # (a x n) . vector = 0: here a x n is the fixed direction.
-    normal = side
-    axis = np.cross(normal, fixed)
+    axis = np.cross(side, fixed)
     return PrescribedAngle(
         f"no spin of {body.name}",
         SPACE,
         body.name,
         0.0,
         axis_i=tuple(axis),
-        normal_i=tuple(normal),
+        normal_i=tuple(side),
         normal_j=tuple(rotation.T @ side),
     )

@@ -26,6 +26,15 @@ from catenary.meshgen.topologies.line_data import (
 from catenary.meshgen.topologies.overlaps import with_overlaps
 from catenary.meshgen.wires import Conductor, Role
 
+SIMPLE, COMPOUND, STITCHED, SINGLE = "simple", "compound", "stitched", "single"
+TWIN, TWIN_MESSENGER, FREE = "twin", "twin_messenger", "free"
+AUXILIARY_WIRE, AUXILIARY_DROPPERS = "auxiliary_wire", "auxiliary_droppers"
+STITCH_WIRE, STITCH_DROPPERS, STITCH_CLAMPS = "stitch_wire", "stitch_droppers", "stitch_clamps"
+BRIDLE_WIRE, BRIDLE_CLAMPS = "bridle_wire", "bridle_clamps"
+# Parts of most topologies: wires hang by droppers from a messenger wire.
+HUNG = ("contact_wire", "messenger_wire", "dropper")
+
+
 Make = Callable[[LineData], Line]
 
 
@@ -39,9 +48,6 @@ class Topology(NamedTuple):
     parts: tuple[str, ...]
     may: tuple[str, ...]
 
-
-# Parts of most topologies: wires hang by droppers from a messenger wire.
-HUNG = ("contact_wire", "messenger_wire", "dropper")
 
 _TOPOLOGIES: dict[str, Topology] = {}
 
@@ -83,13 +89,6 @@ def unregister(name: str) -> None:
 def registered() -> dict[str, Topology]:
     """The topologies registered so far by name."""
     return dict(_TOPOLOGIES)
-
-
-SIMPLE, COMPOUND, STITCHED, SINGLE = "simple", "compound", "stitched", "single"
-TWIN, TWIN_MESSENGER, FREE = "twin", "twin_messenger", "free"
-AUXILIARY_WIRE, AUXILIARY_DROPPERS = "auxiliary_wire", "auxiliary_droppers"
-STITCH_WIRE, STITCH_DROPPERS, STITCH_CLAMPS = "stitch_wire", "stitch_droppers", "stitch_clamps"
-BRIDLE_WIRE, BRIDLE_CLAMPS = "bridle_wire", "bridle_clamps"
 
 
 def make_line(data: LineData) -> Line:

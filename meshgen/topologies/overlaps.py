@@ -11,9 +11,7 @@ import numpy as np
 
 from catenary.meshgen.line import Clamps, Droppers, Line, SteadyArms, Supports
 from catenary.meshgen.topologies.line_data import Overlaps
-from catenary.meshgen.wires import End, Piece, Profile, Section, Wire
-
-_SAME_PLACE = 1e-6  # [m]
+from catenary.meshgen.wires import SAME_PLACE, End, Piece, Profile, Section, Wire
 
 _Joining = TypeVar("_Joining", Droppers, Clamps)
 _AtWire = TypeVar("_AtWire", SteadyArms, Supports)
@@ -192,8 +190,8 @@ class _Sections:
         groups = []
         for group in self._line.clamps:
             x, ends = np.array(group.x), self._clamped_ends
-            which = np.searchsorted(ends, x - _SAME_PLACE)
-            there = x[np.append(ends, np.inf)[which] < x + _SAME_PLACE]
+            which = np.searchsorted(ends, x - SAME_PLACE)
+            there = x[np.append(ends, np.inf)[which] < x + SAME_PLACE]
             if there.size:
                 groups.append(replace(self._named(group), x=tuple(there.tolist())))
         return groups
@@ -217,8 +215,8 @@ class _Sections:
 
     def _inside(self, low: np.ndarray | float, high: np.ndarray | float) -> np.ndarray:
         """Whether stretches from ``low`` to ``high`` are inside one section [m]."""
-        which = np.searchsorted(self._ends[:, 0], np.asarray(low) - _SAME_PLACE) - 1
-        before_end = np.asarray(high) < self._ends[which, 1] - _SAME_PLACE
+        which = np.searchsorted(self._ends[:, 0], np.asarray(low) - SAME_PLACE) - 1
+        before_end = np.asarray(high) < self._ends[which, 1] - SAME_PLACE
         return np.asarray((which >= 0) & before_end)
 
     def _keeps(self, piece: Piece) -> bool:
@@ -230,7 +228,7 @@ class _Sections:
     def _reached(self, piece: Piece) -> np.ndarray:
         """Into which sections a piece reaches, bool (n_sections,)."""
         low, high = self._ends.T
-        return (piece.x[0] < high - _SAME_PLACE) & (piece.x[-1] > low + _SAME_PLACE)
+        return (piece.x[0] < high - SAME_PLACE) & (piece.x[-1] > low + SAME_PLACE)
 
     def _parts(self, piece: Piece) -> list[Piece]:
         """Part of a piece inside the sections."""

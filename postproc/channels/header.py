@@ -17,10 +17,8 @@ from catenary.meshgen.wires import Role
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
-    from catenary.meshgen.line import Line
-    from catenary.meshgen.mesh import LineMesh
+    from catenary.solver.model.rest_shape import Equilibrium
     from catenary.solver.statics.elasticity import Elasticity
-    from catenary.solver.statics.form_finding import Equilibrium
 
 NONE, GZIP = "none", "gzip"
 # Level 4 was not smaller than level 1 on the forces of droppers, and slower.

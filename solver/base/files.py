@@ -20,6 +20,7 @@ _REMEDIES = {
     errno.ENAMETOOLONG: "choose a shorter name",
 }
 _LONGEST = 300  # characters of a path that a sentence repeats
+_MOST = 100  # letters of a name that are kept; with what is added it may have 255 bytes
 
 
 def is_file(path: Path) -> bool:
@@ -56,9 +57,6 @@ def _mode(path: Path) -> int:
         name = str(path) if len(str(path)) <= _LONGEST else f"{str(path)[:_LONGEST]}..."
         remedy = _REMEDIES.get(error.errno or 0, "name another")
         raise InputError(f"{name} cannot be looked up ({error.strerror}): {remedy}") from error
-
-
-_MOST = 100  # letters of a name that are kept; with what is added it may have 255 bytes
 
 
 def part_of(path: Path, process: int, end: str = "") -> Path:

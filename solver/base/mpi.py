@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from catenary.base.process import settings
+from catenary.base.process import mpi_settings
 
-with settings():
+with mpi_settings():
     from mpi4py import MPI
 
 __all__ = ["MPI"]

@@ -10,9 +10,9 @@ import sys
 
 import petsc4py
 
-from catenary.base.process import python_signals_kept, settings
+from catenary.base.process import mpi_settings, python_signals_kept
 
-with python_signals_kept(), settings():  # PETSc starts MPI unless it runs
+with python_signals_kept(), mpi_settings():  # PETSc starts MPI unless it runs
     if "petsc4py.PETSc" not in sys.modules:
         # An argument, as PETSc looks for the files before it reads the variable PETSC_OPTIONS.
         petsc4py.init(["catenary", "-skip_petscrc"])

@@ -8,7 +8,6 @@ freed is given back to the system.
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import gc
 import os
@@ -25,7 +24,7 @@ from catenary.base.parallel import launched_by_mpirun
 # each driver of a graphics card. Its folder for what processes of a job share has one name for all
 # that no launcher has started: one that ends would take it from another that starts. Other
 # implementations do not read these variables.
-SETTINGS = {
+MPI_SETTINGS = {
     "OMPI_MCA_ess_singleton_isolated": "1",
     "OMPI_MCA_pml": "ob1",
     "OMPI_MCA_btl": "self",
@@ -35,10 +34,12 @@ SETTINGS = {
 # What Open MPI 4 leaves in the environment of a process that no launcher has started, with which no
 # launcher starts from there.
 _LEFT = ("OMPI_MCA_ess", "OMPI_MCA_pmix")
+# Unknowns from which it pays to give memory back.
+_LONG = 200_000
 
 
-@contextlib.contextmanager
-def settings() -> Iterator[None]:
+@contextmanager
+def mpi_settings() -> Iterator[None]:
     """Within the context MPI starts as a single process, unless mpirun started it. Not collective.
 
     Variables that the environment already sets keep their values. Those set here, and what MPI adds
@@ -47,7 +48,7 @@ def settings() -> Iterator[None]:
     if launched_by_mpirun():
         yield
         return
-    added = {name: value for name, value in SETTINGS.items() if name not in os.environ}
+    added = {name: value for name, value in MPI_SETTINGS.items() if name not in os.environ}
     os.environ.update(added)
     try:
         yield
@@ -61,7 +62,7 @@ def settings() -> Iterator[None]:
 
 def world() -> Any:
     """The communicator of all processes; starts MPI. Not collective."""
-    with settings():
+    with mpi_settings():
         from mpi4py import MPI
 
     return MPI.COMM_WORLD
@@ -96,10 +97,6 @@ def python_signals_kept() -> Iterator[None]:
         for number, handler in kept.items():
             signal.signal(number, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-# Unknowns from which it pays to give memory back.
-_LONG = 200_000
 
 
 def give_back(n_unknowns: int) -> None:

@@ -11,7 +11,8 @@ from catenary.solver.kernels import native
 from catenary.solver.kernels.native import NODE, SAMPLE, SLIP, TOUCH
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
-from catenary.solver.statics.form_finding import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.model.unknowns import UPRIGHT
 
 # Samples to the shortest wave. A cubic with the heights and slopes of a sine at its ends is off by
 # (k h)^4 / 384 = 2e-4 of its amplitude at most.
@@ -99,7 +100,7 @@ class ContactWires:
     @property
     def dofs(self) -> np.ndarray:
         """Unknowns (w, theta_y) of their nodes (n_nodes, 2); made anew when asked for."""
-        own = [self._numbering.of(self.mesh_nodes, name) for name in ("w", "theta_y")]
+        own = [self._numbering.of(self.mesh_nodes, name) for name in UPRIGHT]
         return np.stack(own, axis=1)
 
     @property

@@ -1,6 +1,4 @@
-"""Contacts of a rank and its links that switch under way, and the line's response to their
-forces.
-"""
+"""Contacts of a rank, its links that switch under way, and the line's response to their forces."""
 
 from __future__ import annotations
 
@@ -16,12 +14,13 @@ from catenary.solver.contact.responses import LineResponse
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import LineState
 from catenary.solver.kernels import native
-from catenary.solver.linear.pieces import columns_of
+from catenary.solver.linear.pieces import columns_by_pieces
 from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH, ShortColumns
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import LinkTable, some_of
-from catenary.solver.statics.form_finding import Equilibrium
+from catenary.solver.model.unknowns import LEVEL
 
 
 class FollowedLinks:
@@ -178,7 +177,7 @@ class LinkCoupling:
         self._band: np.ndarray | None = None
         places = unknowns[:, None], weights[:, None], law["place"], table.half_length
         operators = line.operators.in_pieces
-        self.columns = columns_of(line.responses, operators, places, self._couple)
+        self.columns = columns_by_pieces(line.responses, operators, places, self._couple)
         band = self._band_of(self.columns)
         if comm.size > 1:
             band = comm.reduce(band, root=0)
@@ -216,20 +215,6 @@ class LinkCoupling:
             answer = np.where(inside, columns.data[at] if columns.data.size else 0.0, 0.0)
             near = per_acceleration[d] * (np.abs(x[d] - x[e]) <= distance)
             band[e, apart + half] = near * (weights[d] * answer).sum(axis=1)
-
-
-def _sideways_of(
-    model: Model, form: Equilibrium, wires: ContactWires, ownership: Ownership
-) -> native.Sideways:
-    """Lateral data of a line at rest in ``form``, empty if it has no lateral motion."""
-    if form.lateral is None:
-        nothing = np.zeros((0, 2))
-        return native.Sideways(nothing.astype(np.int64), nothing.astype(bool), nothing)
-    dofs = np.stack([model.dofs(wires.mesh_nodes, name) for name in ("v", "theta_z")], axis=1)
-    mine = ownership.owned(dofs)
-    local = np.where(mine, dofs - ownership.first, 0).astype(np.int64)
-    rest = np.stack([form.lateral.y, form.lateral.slope], axis=1)[wires.mesh_nodes]
-    return native.Sideways(local, mine, rest)
 
 
 class ForceColumns:
@@ -424,6 +409,20 @@ class ForcesOnLine:
         return [(local.ravel(), pushed.ravel()), *self.links.loads(compensation)]
 
 
+def _sideways_of(
+    model: Model, form: Equilibrium, wires: ContactWires, ownership: Ownership
+) -> native.Sideways:
+    """Lateral data of a line at rest in ``form``, empty if it has no lateral motion."""
+    if form.lateral is None:
+        nothing = np.zeros((0, 2))
+        return native.Sideways(nothing.astype(np.int64), nothing.astype(bool), nothing)
+    dofs = np.stack([model.dofs(wires.mesh_nodes, name) for name in LEVEL], axis=1)
+    mine = ownership.owned(dofs)
+    local = np.where(mine, dofs - ownership.first, 0).astype(np.int64)
+    rest = np.stack([form.lateral.y, form.lateral.slope], axis=1)[wires.mesh_nodes]
+    return native.Sideways(local, mine, rest)
+
+
 def _columns_of_nodes(
     wires: ContactWires, line: LineIntegrator, range_of_run: tuple[float, float], free: np.ndarray
 ) -> tuple[np.ndarray, float]:
@@ -446,5 +445,5 @@ def _columns_of_nodes(
         nodes["width"][mine] = found.width[which]
 
     places = dofs, free[dofs].astype(float), wires.x[chosen]
-    found = columns_of(line.responses, line.operators.in_pieces, places, put)
+    found = columns_by_pieces(line.responses, line.operators.in_pieces, places, put)
     return found.data, found.reach

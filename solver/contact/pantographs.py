@@ -21,7 +21,7 @@ from catenary.mbs.build import (
 )
 from catenary.mbs.head.newmark_head import SteppedHead
 from catenary.mbs.head.stepping import CrossingPath, FollowedPath, LateralPath, Stepping
-from catenary.mbs.interface import N_DRIVE, Pantograph, called_by_kernels, named
+from catenary.mbs.interface import N_DRIVE, Pantograph, called_by_kernels, drives_by_name
 from catenary.mbs.lowering import LoweredPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.vehicle import BaseMotion
@@ -295,9 +295,9 @@ class Pantographs:
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what ``heads_in_loop`` depend on in steps to ``times`` [s].
 
-        ``drives`` (len(times), n, `drives.drive_width`).
+        ``drives`` (len(times), n, `interface.drive_width`).
         """
-        named(drives)["time"] = times[:, None]
+        drives_by_name(drives)["time"] = times[:, None]
         for number, model in enumerate(self.models):
             if isinstance(model, SteppedHead | LoweredPantograph):
                 model.fill_drives(times, drives[:, number])

@@ -55,6 +55,8 @@ _NO_SOLUTION = (
 )
 # Links that the arrays have room for at first.
 _FIRST_ROOM = 32
+# Forces that grow beyond this [N] will not come back.
+DIVERGED = 1e9
 
 
 class InnerSolution(NamedTuple):
@@ -200,10 +202,6 @@ class InnerProblem:
         self.room = native.Room(self.law.n + self._room)
         self._solution = self.room.solution
         self._bound_to = None, None
-
-
-# Forces that grow beyond this [N] will not come back.
-DIVERGED = 1e9
 
 
 class Coupling(ABC):

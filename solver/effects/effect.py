@@ -64,7 +64,7 @@ class Effect:
     lifts : limits of a scene that do not hold with the effect
     data : keys of the scene's data that it acts on; empty if it acts on any scene
     after_cutting : True for an effect on a line whose droppers are cut: form finding leaves it out,
-        and the line then hangs with it (`all_effects.with_defects`)
+        and the line then hangs with it (`rest_nearby.hang`)
     cut_for : of an effect after cutting, True where droppers are cut for it
     hangs : of an effect after cutting, what the line's wires become with it
     """

@@ -39,6 +39,10 @@ from catenary.solver.window.moving_window import MovingWindow
 
 # Arrays of every state of a line.
 MOTION = ("displacement", "velocity", "acceleration")
+# Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
+# memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
+_STRETCH = 8192
+_NO_LOADS = np.zeros(0)
 
 
 class LineIntegrator(ABC):
@@ -343,12 +347,6 @@ class LineIntegrator(ABC):
             self.loads.memories.destroy()
         self.operators.destroy()
         self.solution.destroy()
-
-
-# Unknowns of a stretch of the pass back, after which its droppers are looked at: large enough for
-# memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
-_STRETCH = 8192
-_NO_LOADS = np.zeros(0)
 
 
 class StationPasses:

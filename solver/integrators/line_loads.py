@@ -31,6 +31,8 @@ from catenary.solver.model.loads import (
 
 # Lags below this are summed one by one; a power of two.
 NEAR = native.NEAR
+# Size of the samples of a load [B], and the most slices that are made at once.
+_BYTES, _MOST_SLICES = 2**24, 512
 
 
 class EndMemories:
@@ -221,10 +223,6 @@ def _none() -> native.Memories:
 
 # ``EndMemories.arguments`` of a line without memories.
 NO_MEMORIES = _none()
-
-
-# Size of the samples of a load [B], and the most slices that are made at once.
-_BYTES, _MOST_SLICES = 2**24, 512
 
 
 class LineLoads:

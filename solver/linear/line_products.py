@@ -28,6 +28,14 @@ from catenary.solver.model.matrices import as_petsc, part_of
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 
+_COEFFICIENTS = {
+    "mass": (1.0, 0.0, 0.0),
+    "stiffness": (0.0, 1.0, 0.0),
+    "damping": (0.0, 0.0, 1.0),
+}
+# Products of each vector that a row of M is to have less than one of K to take its place.
+FEWER = 1.5
+
 
 @dataclass(frozen=True)
 class Subdomain:
@@ -113,15 +121,6 @@ class Halo:
         for request in self._requests:
             request.Free()
         self._requests = []
-
-
-_COEFFICIENTS = {
-    "mass": (1.0, 0.0, 0.0),
-    "stiffness": (0.0, 1.0, 0.0),
-    "damping": (0.0, 0.0, 1.0),
-}
-# Products of each vector that a row of M is to have less than one of K to take its place.
-FEWER = 1.5
 
 
 class LineProducts:

@@ -29,6 +29,12 @@ _LOOKS = (f"{PREFIX}ksp_view", f"{PREFIX}ksp_monitor", f"{PREFIX}ksp_converged_r
 DIRECT = 1e-12
 
 
+def trial_load(low: int, high: int) -> np.ndarray:
+    """A load on the unknowns from ``low`` to before ``high``, on each another one, by which the
+    residual of a solve is judged."""
+    return np.cos(1.0 + 3.7 * np.arange(low, high))
+
+
 @contextmanager
 def refused_options() -> Iterator[None]:
     """Turn PETSc's error about an option into one for the user. Every rank meets the same one.

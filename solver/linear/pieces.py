@@ -14,7 +14,7 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.solver.kernels import aligned_arrays, native
-from catenary.solver.linear.petsc_solvers import DIRECT, wants_own_solver
+from catenary.solver.linear.petsc_solvers import DIRECT, trial_load, wants_own_solver
 from catenary.solver.linear.station_factors import (
     MIDDLES,
     FoundFactors,
@@ -54,9 +54,15 @@ from catenary.solver.model.unknowns import Unknowns
 
 # Stations of a piece, some twenty spans: a multiple of ``MIDDLES``.
 _SIZE = 1024
-# Margin of a piece beyond its ends, in reaches of a step, so that nothing of
-# where that ends is left in it.
+# Margin of a piece beyond its ends, in reaches of a step, so that nothing of where that ends is
+# left in it.
 _BEYOND = 2.0
+# Message where stations are joined otherwise than the layout has it.
+JOINED_OTHERWISE = (
+    "nodes of the line are coupled in another way than those at its start, which a window cannot "
+    "follow; set window.mode to off"
+)
+Made = Callable[[ShortColumns, np.ndarray], None]
 
 
 class Piece(NamedTuple):
@@ -187,13 +193,6 @@ class Slots:
         first = slot * self._room
         self.numbers[first : first + numbers.size] = numbers
         return first
-
-
-# Message where stations are joined otherwise than the layout has it.
-JOINED_OTHERWISE = (
-    "nodes of the line are coupled in another way than those at its start, which a window cannot "
-    "follow; set window.mode to off"
-)
 
 
 class FactorPieces:
@@ -410,8 +409,7 @@ def _residual(rows: StationRows, layout: Layout, stations: Sections) -> float:
     if product is None or factors is None:
         return np.inf
     size, pad = int(stations.starts[-1]), stations.width
-    load = np.cos(1.0 + 3.7 * np.arange(size))
-    found, answer = np.zeros(size + 2 * pad), np.zeros(size)
+    found, answer, load = np.zeros(size + 2 * pad), np.zeros(size), trial_load(0, size)
     factors.solve(load, answer)
     found[pad : pad + size] = answer
     product.multiply(found, answer)
@@ -461,10 +459,7 @@ def _kinds_of_elements(
     return station[dofs[first]], place[dofs[first]]
 
 
-Made = Callable[[ShortColumns, np.ndarray], None]
-
-
-def columns_of(
+def columns_by_pieces(
     responses: UnitResponses,
     operators: OperatorPieces | None,
     places: tuple[np.ndarray, ...],

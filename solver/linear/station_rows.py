@@ -26,6 +26,13 @@ from catenary.solver.model.unknowns import Unknowns
 
 # Of stations that are all alike.
 _ALIKE = native.Sections(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.uint8))
+# Odd numbers without a pattern: of Knuth's linear congruential generator and of SplitMix64.
+_RATIO = 6364136223846793005
+_FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+# Shares of M, K and C.
+Coefficients = tuple[float, float, float]
+# Stations whose entries are put together at once, some 50 MB of them.
+_STRETCH = 2**14
 
 
 @dataclass(frozen=True)
@@ -101,11 +108,6 @@ def places_of(unknowns: np.ndarray, columns: Sections) -> tuple[np.ndarray, np.n
     for row, places in zip(place_of, columns.station_types, strict=True):
         row[: len(places)] = places
     return station, place_of[columns.station_type[station], unknowns - columns.starts[station]]
-
-
-# Odd numbers without a pattern: of Knuth's linear congruential generator and of SplitMix64.
-_RATIO = 6364136223846793005
-_FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 
 
 class LikeStations:
@@ -188,12 +190,6 @@ def _mixed(numbers: np.ndarray) -> np.ndarray:
     numbers = (numbers ^ (numbers >> np.uint64(30))) * _FIRST
     numbers = (numbers ^ (numbers >> np.uint64(27))) * _SECOND
     return np.asarray(numbers ^ (numbers >> np.uint64(31)))
-
-
-# Shares of M, K and C.
-Coefficients = tuple[float, float, float]
-# Stations whose entries are put together at once, some 50 MB of them.
-_STRETCH = 2**14
 
 
 class StationRows(NamedTuple):

@@ -25,6 +25,7 @@ from catenary.solver.linear.petsc_solvers import (
     SchwarzSolver,
     Wrapped,
     allows_own_factors,
+    trial_load,
     wants_distributed_solver,
     wants_view,
 )
@@ -33,7 +34,7 @@ from catenary.solver.linear.station_factors import StationFactors, station_facto
 from catenary.solver.linear.station_products import MOST_UNKNOWNS, StationProduct
 from catenary.solver.linear.station_rows import LikeStations, Sections
 from catenary.solver.linear.unit_responses import Windows
-from catenary.solver.model.matrices import columns_of, part_of
+from catenary.solver.model.matrices import coupled_with, part_of
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.problem.problem import BOUNDED
@@ -338,7 +339,7 @@ class LineOperators:
         Overwrites ``factor`` and ``answer``.
         """
         owned, arrays, loaded = self.domain.owned, self._arrays, self._arrays.loaded
-        load = np.cos(1.0 + 3.7 * np.arange(self.domain.low, self.domain.high))
+        load = trial_load(self.domain.low, self.domain.high)
         loaded.array[:] = load
         self._solve(loaded)
         self.factor[:] = self.answer
@@ -429,13 +430,13 @@ class LineOperators:
         places = model.numbering
         begin, end = places.stations_over(first, last)
         near = windows.around(float(places.low[begin]), float(places.high[end - 1]))
-        coupled = columns_of(model, (first, last))
+        coupled = coupled_with(model, (first, last))
         return places.whole(min(near[0], coupled[0]), max(near[1], coupled[1]))
 
     def _make_arrays(self, low: int, high: int, comm: Any) -> None:
         """Arrays for [low, high), products over it, and the halos of both."""
         own, model = self._ownership, self._model
-        read_low, read_high = model.numbering.whole(*columns_of(model, (low, high)))
+        read_low, read_high = model.numbering.whole(*coupled_with(model, (low, high)))
         self.domain = domain = Subdomain(own.first, own.last, low, high, read_low, read_high)
         self._arrays = arrays = StepArrays(domain, self._pad, comm)
         here = domain, arrays.padded, arrays.read_here

@@ -16,12 +16,13 @@ import numpy as np
 
 from catenary.base.errors import RunBroken
 from catenary.base.mpi import MPI
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.linear.station_rows import LikeStations
 from catenary.solver.model.alike import kinds_of
 from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
-from catenary.solver.model.unknowns import SAME_STATION, Unknowns
+from catenary.solver.model.unknowns import Unknowns
 
 # Beyond the reach a column is below this share of its peak; two orders under what an iteration
 # over a whole run may add up to and still agree to 1e-9.
@@ -34,6 +35,26 @@ _WINDOW = 200.0
 _SEEN_OF_WINDOW = 0.9
 # Distance around the longest element in which loads are tried, about a span to either side [m].
 _NEAR = 75.0
+# Allowed part outside the windows, relative to the peak: round-off of one solve.
+_LEAK = 1e-13
+# Margin of a stretch beyond windows, of the reach, which shows whether columns leak.
+_SEEN = 0.25
+# Length of the places that are solved for on one stretch [m]: about a span.
+STRETCH = 60.0
+# With windows wider than this to both sides [m], as along the track with much damping, some of the
+# columns are looked at first: what forces on heights are felt at is mostly narrower.
+_LONG = 100.0
+_PROBES = 12
+# Allowed part outside of windows that are made narrower, and how much wider they are than seen.
+# A column that is cut there acts like a force of this share beside its own: 1e-10 N.
+_FELT, _MARGIN = 1e-12, 1.1
+# Allowed part outside of windows that cannot be made wider any more: a force of 1e-7 N beside its
+# own. Columns fade with the way, so that this bears them half as wide again as those tried.
+FELT_AT_MOST = 1e-9
+# No answer is as small, but for one to no force.
+_TINY = np.finfo(float).tiny
+# By how much the reach of windows grows where some column is felt further.
+_MORE = 1.5
 
 
 def reach(model: Model, bands: OperatorBands) -> float:
@@ -64,7 +85,7 @@ def reach(model: Model, bands: OperatorBands) -> float:
 
 def _around_the_longest(positions: np.ndarray) -> tuple[float, np.ndarray]:
     """Place of the longest element [m], and stations near it at which element lengths change."""
-    stations = positions[np.append(True, np.diff(positions) > SAME_STATION)]
+    stations = positions[np.append(True, np.diff(positions) > SAME_PLACE)]
     lengths = np.diff(stations)
     place = float(stations[np.argmax(lengths)])
     changes = np.abs(np.diff(lengths)) > 0.01 * lengths[1:]
@@ -89,7 +110,7 @@ def _reach_of(
     first, last = model.numbering.within(place - window, place + window)
     x = model.numbering.as_vector(model.mesh.points[:, :1], np.inf)[first:last]
     x[model.constrained_between(first, last) - first] = np.inf
-    loaded = np.flatnonzero((np.abs(x[:, None] - loads) <= SAME_STATION).any(axis=1))
+    loaded = np.flatnonzero((np.abs(x[:, None] - loads) <= SAME_PLACE).any(axis=1))
     right = np.zeros((loaded.size, last - first))
     right[np.arange(loaded.size), loaded] = 1.0
     columns = np.abs(bands.solve(first, last, right))
@@ -98,28 +119,6 @@ def _reach_of(
     both = np.maximum(positions[-1] - loads, loads - positions[0])
     seen = np.minimum(window - np.abs(loads - place), both).min()
     return float(apart.max(initial=0.0)), float(seen)
-
-
-# Allowed part outside the windows, relative to the peak: round-off of one solve.
-_LEAK = 1e-13
-# Margin of a stretch beyond windows, of the reach, which shows whether columns leak.
-_SEEN = 0.25
-# Length of the places that are solved for on one stretch [m]: about a span.
-STRETCH = 60.0
-# With windows wider than this to both sides [m], as along the track with much damping, some of the
-# columns are looked at first: what forces on heights are felt at is mostly narrower.
-_LONG = 100.0
-_PROBES = 12
-# Allowed part outside of windows that are made narrower, and how much wider they are than seen.
-# A column that is cut there acts like a force of this share beside its own: 1e-10 N.
-_FELT, _MARGIN = 1e-12, 1.1
-# Allowed part outside of windows that cannot be made wider any more: a force of 1e-7 N beside its
-# own. Columns fade with the way, so that this bears them half as wide again as those tried.
-FELT_AT_MOST = 1e-9
-# No answer is as small, but for one to no force.
-_TINY = np.finfo(float).tiny
-# By how much that reach grows where some column is felt further.
-_MORE = 1.5
 
 
 class FeltFurther(RunBroken):

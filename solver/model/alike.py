@@ -37,8 +37,13 @@ def alike(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``kinds_of`` rows that agree in all but their last bits; what is nothing beside the largest
     of a row counts as zero."""
     least = np.ldexp(np.abs(rows).max(axis=1, initial=0.0), -_EQUAL_BITS)[:, None]
-    mantissa, exponent = np.frexp(np.where(np.abs(rows) < least, 0.0, rows))
-    return kinds_of(np.ldexp(np.rint(np.ldexp(mantissa, _EQUAL_BITS)), exponent - _EQUAL_BITS))
+    return kinds_of(rounded(np.where(np.abs(rows) < least, 0.0, rows), _EQUAL_BITS))
+
+
+def rounded(numbers: np.ndarray, bits: int) -> np.ndarray:
+    """Numbers with so many ``bits``, of the same shape."""
+    mantissa, exponent = np.frexp(numbers)
+    return np.ldexp(np.rint(np.ldexp(mantissa, bits)), exponent - bits)
 
 
 def digests(rows: np.ndarray) -> np.ndarray:

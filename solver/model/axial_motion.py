@@ -15,24 +15,26 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.meshgen.line import Curve
-from catenary.meshgen.wires import End
+from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import SAME_PLACE, End
 from catenary.solver.model import beam
-from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.unknowns import SAME_STATION
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 
 # Slopes at rest that differ by less are one, so that like spans have like matrices [-]. What that
 # changes of a stiffness is a share of 1e-11 of EA.
 _SLOPE = 1e-10
-_UPRIGHT, _LEVEL = ("w", "theta_y"), ("v", "theta_z")
+# An end is at its stop if it is nearer than this [m].
+_AT_STOP = 1e-9
 
 
 def unknowns_along(model: Model, wire: str) -> np.ndarray:
     """Unknowns of the elements of a wire: u of both ends, then deflection and slope of both in the
     vertical plane, (n, 6), and in the lateral one where it is simulated, (n, 10)."""
     parts = [model.dofs(model.mesh.elements(wire), "u")]
-    for plane in (_UPRIGHT, _LEVEL) if model.simulated.lateral else (_UPRIGHT,):
-        parts.append(wire_elements(model, wire, plane)[0])
+    for plane in (UPRIGHT, LEVEL) if model.simulated.lateral else (UPRIGHT,):
+        parts.append(model.wire_elements(wire, plane)[0])
     return np.concatenate(parts, axis=1)
 
 
@@ -97,9 +99,11 @@ def rows_in_curve(
     return upright, level
 
 
-def slope_rows(length: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """(1 / h) integral of z' N' dx of elements, (n, 4), of their shapes z (n, 4)."""
-    pull = beam.stiffness(length, 0.0, 1.0)
+def slope_rows(length: np.ndarray, shape: np.ndarray, taut: np.ndarray | None = None) -> np.ndarray:
+    """(1 / h) integral of z' N' dx of elements, (n, 4), of their shapes z (n, 4): how the mean
+    strain grows with the unknowns of a plane on straight track. ``taut`` are the matrices (n, 4, 4)
+    of a unit of tension, if there are any."""
+    pull = beam.stiffness(length, 0.0, 1.0) if taut is None else taut
     return np.asarray(np.einsum("nij,nj->ni", pull, shape) / length[:, None])
 
 
@@ -107,10 +111,6 @@ def bar_mass(length: np.ndarray, mass_per_length: float) -> np.ndarray:
     """Consistent mass matrices of bars, shape (n, 2, 2) [kg]."""
     shape = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
     return np.asarray(mass_per_length * length[:, None, None] * shape)
-
-
-# An end is at its stop if it is nearer than this [m].
-_AT_STOP = 1e-9
 
 
 class WireEnd(NamedTuple):
@@ -121,6 +121,10 @@ class WireEnd(NamedTuple):
     wire: str
     tensioned: bool
     outwards: int
+
+    def element(self, mesh: LineMesh) -> int:
+        """Number of the wire's element that ends there."""
+        return int(np.flatnonzero((mesh.elements(self.wire) == self.node).any(axis=1))[0])
 
 
 def ends_of(model: Model) -> list[WireEnd]:
@@ -136,7 +140,7 @@ def ends_of(model: Model) -> list[WireEnd]:
                 if kind is not End.CLAMPED:
                     x = float(mesh.points[node, 0])
                     if tensioned is None:
-                        tensioned = along.tensioned(x, line_ends, SAME_STATION)
+                        tensioned = along.tensioned(x, line_ends, SAME_PLACE)
                     found.append(WireEnd(int(node), wire.name, tensioned, outwards))
     return found
 
@@ -180,5 +184,4 @@ def mid_points(model: Model) -> np.ndarray:
 
 def tension_at_rest(model: Model, end: WireEnd) -> float:
     """Tension of a wire in its last element before an end, at rest [N]."""
-    element = np.flatnonzero((model.mesh.elements(end.wire) == end.node).any(axis=1))[0]
-    return float(model.tension_of(end.wire)[element])
+    return float(model.tension_of(end.wire)[end.element(model.mesh)])

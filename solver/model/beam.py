@@ -16,6 +16,13 @@ import numpy as np
 # Rotation of a wire from rest [rad] at which a march ends: the force of its tension T across the
 # track of its rest, T sin(phi), is taken as T phi, and is then wrong by 16 %.
 MOST_ROTATION = 1.0
+_Place = float | np.ndarray
+# A wire that does not bend has slopes of its own at nodes only as the limit of one that does: its
+# layer is this share of an element. A kink of 0.02 in an element of 10 m is then off by 5e-6 m.
+_THINNEST = 1e-4
+# Below this k the series of k coth k - 1 is used: it leaves out 2 k^4 / 315 of the whole, and what
+# the difference would lose is EPS / k^2, both 1e-10 at most.
+_SERIES = 1e-2
 
 
 def stiffness(
@@ -95,9 +102,6 @@ def _matrix(*upper_rows: list[np.ndarray]) -> np.ndarray:
     return result
 
 
-_Place = float | np.ndarray
-
-
 def shape_values(xi: _Place, length: _Place) -> np.ndarray:
     """Hermite functions N at ``xi`` in [0, 1], shape (4,) or (4, n): w(x) = N @ unknowns [m]."""
     square, cube = xi * xi, xi * xi * xi
@@ -123,14 +127,6 @@ def shape_slopes(xi: _Place, length: _Place) -> np.ndarray:
             3 * square - 2 * xi,
         ]
     )
-
-
-# A wire that does not bend has slopes of its own at nodes only as the limit of one that does: its
-# layer is this share of an element. A kink of 0.02 in an element of 10 m is then off by 5e-6 m.
-_THINNEST = 1e-4
-# Below this k the series of k coth k - 1 is used: it leaves out 2 k^4 / 315 of the whole, and what
-# the difference would lose is EPS / k^2, both 1e-10 at most.
-_SERIES = 1e-2
 
 
 def exact_stiffness(

@@ -7,19 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from catenary.meshgen.mesh import DROPPERS
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.model import beam
 from catenary.solver.model.alike import alike
 from catenary.solver.model.link_directions import between_nodes, dropper_directions
 from catenary.solver.model.links import BOTH, NO_BENDS, PULLS, Bends, Direction, Links, law
 from catenary.solver.model.loads import Load
-from catenary.solver.model.model import Block, Hanging, Model, wire_elements
-from catenary.solver.model.unknowns import SAME_STATION
+from catenary.solver.model.model import Block, Hanging, Model
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.problem.problem import Problem
 
 # Displacements of a node beside its height, in which its masses move as well.
-_LEVEL = ("u", "v")
-# Unknowns of a wire in the lateral plane.
-_LATERAL = ("v", "theta_z")
+_BESIDE = ("u", "v")
 
 
 class ModelBuilder:
@@ -37,7 +36,7 @@ class ModelBuilder:
         self._constrained: list[np.ndarray] = []
         self._n_terms = 0
 
-    def add_wire(self, wire: str, unknowns: tuple[str, str] = ("w", "theta_y")) -> None:
+    def add_wire(self, wire: str, unknowns: tuple[str, str] = UPRIGHT) -> None:
         """Bending and tension of a wire in the plane of two unknowns; its mass and weight."""
         if self._before is not None:
             number = len(self.model.blocks)
@@ -45,7 +44,7 @@ class ModelBuilder:
             if number in self._before.hanging_wires:
                 self._hang(number, self._before.hanging_wires[number])
             return
-        dofs, length = wire_elements(self.model, wire, unknowns)
+        dofs, length = self.model.wire_elements(wire, unknowns)
         data = self.problem.line.wire(wire)
         section, bending = data.left_of(self.mesh.x(self.mesh.elements(wire)))
         each = np.column_stack([length, self.model.tension_of(wire), section, bending])
@@ -54,7 +53,7 @@ class ModelBuilder:
         mass = beam.mass(length, data.mass_per_length * section)
         stiffness = beam.stiffness(length, data.bending_stiffness * bending, tension)
         load = (data.mass_per_length * section)[:, None] * beam.uniform_load(length)
-        lateral = tuple(unknowns) == _LATERAL
+        lateral = tuple(unknowns) == LEVEL
         self.add_block(Block(wire, dofs, kind, mass, stiffness, of_shape=True, lateral=lateral))
         if unknowns[0] == "w":
             self._hang(len(self.model.blocks) - 1, load)
@@ -94,7 +93,7 @@ class ModelBuilder:
         values = np.broadcast_to(np.asarray(mass, dtype=float), nodes.shape)
         dofs = self.model.dofs(nodes, unknown)
         self.add_elements(component, dofs[:, None], mass=values[:, None, None])
-        for name in _LEVEL if unknown == "w" else ():
+        for name in _BESIDE if unknown == "w" else ():
             there = self.model.numbering.has(nodes, name)
             if there.any():
                 self.add_masses(component, nodes[there], values[there], unknown=name)
@@ -217,7 +216,7 @@ class ModelBuilder:
         anchors, masts = self.mesh.anchors, self.problem.line.support_positions
         x, held = self.mesh.x(anchors), np.ones(anchors.size, dtype=bool)
         for place, goes_on in zip(masts[[0, -1]], self.model.simulated.goes_on, strict=True):
-            held &= (np.abs(x - place) > SAME_STATION) | (not goes_on)
+            held &= (np.abs(x - place) > SAME_PLACE) | (not goes_on)
         return np.asarray(anchors[held])
 
     def hold(self, nodes: np.ndarray, unknown: str) -> None:

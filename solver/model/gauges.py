@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.wires import End
+from catenary.meshgen.wires import SAME_PLACE, End
 from catenary.solver.kernels import native
 from catenary.solver.model import axial_motion
 from catenary.solver.model.model import Model
 from catenary.solver.model.switching_links import RESERVE
-from catenary.solver.model.unknowns import SAME_STATION
 from catenary.solver.problem.ends import Tensioner
 from catenary.solver.problem.problem import Problem
 from catenary.solver.problem.watched_links import (
@@ -161,7 +160,7 @@ def _element_at(model: Model, wire: str, place: GaugePlace) -> tuple[int, int]:
     pairs = model.mesh.elements(wire)
     side = 0 if place.outwards < 0 else 1
     element = int(np.argmin(np.abs(model.mesh.x(pairs[:, side]) - place.x)))
-    assert abs(model.mesh.x(pairs[element, side]) - place.x) < SAME_STATION
+    assert abs(model.mesh.x(pairs[element, side]) - place.x) < SAME_PLACE
     return element, int(pairs[element, side])
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from catenary.solver.model.beam import shape_values
 from catenary.solver.model.links import Direction
+from catenary.solver.model.unknowns import UPRIGHT
 
 if TYPE_CHECKING:
     from catenary.solver.model.model import Model
@@ -26,7 +27,7 @@ def between_nodes(model: Model, pairs: np.ndarray, unknown: str = "w") -> Direct
 
 
 def at_places(
-    model: Model, wire: str, x: np.ndarray, plane: tuple[str, str] = ("w", "theta_y")
+    model: Model, wire: str, x: np.ndarray, plane: tuple[str, str] = UPRIGHT
 ) -> Direction:
     """Deflection of a wire at places ``x`` (n,) [m], which may be between its nodes.
 

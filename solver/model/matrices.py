@@ -17,24 +17,11 @@ from catenary.solver.model.model import Block, Model
 if TYPE_CHECKING:
     from catenary.base.petsc import PETSc
 
-
-def iterate_entries(
-    model: Model,
-    first: int,
-    last: int,
-    mass: float,
-    stiffness: float,
-    damping: float,
-    wanted: np.ndarray | None = None,
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Entries (rows, columns, values) of ``mass`` M + ``stiffness`` K + ``damping`` C.
-
-    Only rows in [first, last), of these ``wanted`` (last - first,) ones if that is given; rows and
-    columns of constrained unknowns are left out.
-    """
-    sums = [(mass, stiffness, damping)]
-    for rows, columns, values in iterate_sums(model, first, last, sums, wanted):
-        yield rows, columns, values[0]
+# Rows whose entries are put together at once, some 50 MB of them.
+_STRETCH = 2**16
+# Unknowns whose bands are put together at once, some ninety spans of two wires: entries of a
+# hundred elements take nearly as long as those of a thousand.
+_AT_ONCE = 2**14
 
 
 def iterate_sums(
@@ -44,10 +31,10 @@ def iterate_sums(
     sums: Sequence[tuple[float, float, float]],
     wanted: np.ndarray | None = None,
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """``iterate_entries`` for k sums of M, K and C at once, with values (k, n).
+    """Entries (rows, columns, values) of k sums of M, K and C at once, values (k, n), by blocks.
 
-    ``sums`` are their coefficients of M, K and C; ``first``, ``last`` and ``wanted`` select rows as
-    in ``iterate_entries``.
+    ``sums`` are their coefficients of M, K and C. Only rows in [first, last), of these ``wanted``
+    (last - first,) ones if that is given; rows and columns of constrained unknowns are left out.
     """
     for block in model.blocks:
         alpha, beta = model.damping_of_block(block)
@@ -105,8 +92,23 @@ def _kept(model: Model, dofs: np.ndarray, first: int, last: int) -> np.ndarray |
     return np.asarray(mine[:, :, None] & moves[:, None, :])
 
 
-# Rows whose entries are put together at once, some 50 MB of them.
-_STRETCH = 2**16
+def entries_of(
+    model: Model,
+    first: int,
+    last: int,
+    coefficients: tuple[float, float, float],
+    held_diagonal: float | None = None,
+) -> tuple[np.ndarray, ...]:
+    """All entries (rows, columns, values) of a sum of M, K and C, as ``iterate_sums`` has them, and
+    those of held unknowns on the diagonal if ``held_diagonal`` is given."""
+    none = np.zeros(0, dtype=np.int64)
+    parts = [(none, none, np.zeros(0))]
+    for rows, columns, values in iterate_sums(model, first, last, [coefficients]):
+        parts.append((rows, columns, values[0]))
+    if held_diagonal is not None:
+        held = model.constrained_between(first, last)
+        parts.append((held, held, np.full(held.size, held_diagonal)))
+    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
 
 def whole_matrix(
@@ -121,13 +123,8 @@ def whole_matrix(
     Rows and columns of held unknowns are empty but for ``held_diagonal``.
     """
     n = model.n_dofs
-    parts = list(iterate_entries(model, 0, n, mass, stiffness, damping))
-    if held_diagonal:
-        held = model.constrained
-        parts.append((held, held, np.full(held.size, held_diagonal)))
-    if not parts:
-        return sparse.csc_matrix((n, n))
-    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    coefficients = mass, stiffness, damping
+    rows, columns, values = entries_of(model, 0, n, coefficients, held_diagonal or None)
     return sparse.csc_matrix((values, (rows, columns)), shape=(n, n))
 
 
@@ -176,11 +173,7 @@ def _stretch_of(
     size: int,
 ) -> sparse.bsr_matrix:
     """``part_of`` for so few rows that their entries take little memory."""
-    parts = list(iterate_entries(model, *rows, *coefficients))
-    held = model.constrained
-    held = held[(held >= rows[0]) & (held < rows[1])]
-    parts.append((held, held, np.full(held.size, held_diagonal)))
-    row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
+    row, column, value = entries_of(model, *rows, coefficients, held_diagonal)
     inside = (column >= columns[0]) & (column < columns[1])
     local = sparse.coo_matrix(
         (value[inside], (row[inside] - rows[0], column[inside] - columns[0])),
@@ -209,7 +202,7 @@ def as_petsc(part: sparse.bsr_matrix, comm: Any) -> PETSc.Mat:
     return matrix
 
 
-def columns_of(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
+def coupled_with(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
     """Range of unknowns that M, K and C couple with those of ``rows``. Not collective."""
     low, high = rows
     for block in model.blocks:
@@ -218,11 +211,6 @@ def columns_of(model: Model, rows: tuple[int, int]) -> tuple[int, int]:
             low = min(low, int(block.dofs[near].min()))
             high = max(high, int(block.dofs[near].max()) + 1)
     return low, high
-
-
-# Unknowns whose bands are put together at once, some ninety spans of two wires: entries of a
-# hundred elements take nearly as long as those of a thousand.
-_AT_ONCE = 2**14
 
 
 class OperatorBands:
@@ -277,10 +265,7 @@ class OperatorBands:
         return np.asarray(answers.T)
 
     def _put_together(self, first: int, last: int) -> None:
-        parts = list(iterate_entries(self._model, first, last, *self._coefficients))
-        held = self._model.constrained_between(first, last)
-        parts.append((held, held, np.ones(held.size)))
-        rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+        rows, columns, values = entries_of(self._model, first, last, self._coefficients, 1.0)
         lower = (columns <= rows) & (columns >= first)
         rows, columns, values = rows[lower], columns[lower], values[lower]
         apart, n = rows - columns, last - first

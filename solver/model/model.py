@@ -20,7 +20,7 @@ from catenary.solver.model.alike import alike
 from catenary.solver.model.links import NO_DROPPERS, Links
 from catenary.solver.model.loads import Load
 from catenary.solver.model.rest_shape import Equilibrium
-from catenary.solver.model.unknowns import Unknowns
+from catenary.solver.model.unknowns import UPRIGHT, Unknowns
 from catenary.solver.problem.problem import Problem, Simulated
 
 # Elements of a block that are looked for together: the ends of each are as long as its unknowns.
@@ -280,14 +280,17 @@ class Model:
 
     def tension_of(self, wire: str) -> np.ndarray:
         """Tension of the elements of a wire at rest, (n_elements,) [N]."""
-        pairs = self.mesh.elements(wire)
-        tension = self.problem.line.wire(wire).tension_at(self.mesh.x(pairs).mean(axis=1))
+        tension = self.problem.line.wire(wire).tension_at(self.mesh.middles(wire))
         gained = {} if self.form is None else self.form.gained_tension
         return tension + gained[wire] if wire in gained else tension
 
-    def wire_elements(self, wire: str) -> tuple[np.ndarray, np.ndarray]:
-        """Element unknowns (n, 4) in the vertical plane and lengths (n,) [m] of a wire."""
-        return wire_elements(self, wire, ("w", "theta_y"))
+    def wire_elements(
+        self, wire: str, unknowns: tuple[str, str] = UPRIGHT
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Element unknowns (n, 4) of a wire in the plane of two unknowns, and lengths (n,) [m]."""
+        first, second = self.mesh.elements(wire).T
+        ends = [self.dofs(nodes, name) for nodes in (first, second) for name in unknowns]
+        return np.stack(ends, axis=1), self.mesh.x(second) - self.mesh.x(first)
 
     @property
     def contact_x(self) -> np.ndarray:
@@ -302,15 +305,6 @@ class Model:
     def nodes_of(self, role: Role) -> list[np.ndarray]:
         """Nodes of each wire of a role, in order of x."""
         return [self.mesh.wires[wire.name] for wire in self.problem.line.wires_of(role)]
-
-
-def wire_elements(
-    model: Model, wire: str, unknowns: tuple[str, str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Element unknowns (n, 4) of a wire in the plane of two unknowns, and lengths (n,) [m]."""
-    first, second = model.mesh.elements(wire).T
-    ends = [model.dofs(nodes, name) for nodes in (first, second) for name in unknowns]
-    return np.stack(ends, axis=1), model.mesh.x(second) - model.mesh.x(first)
 
 
 def same_matrices(one: Model, other: Model) -> bool:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
+
 # Forces smaller than this give a bar no direction [N].
 _NO_FORCE = 1e-6
 
@@ -99,6 +101,6 @@ class Equilibrium:
 
     def planes(self) -> Iterator[tuple[tuple[str, str], np.ndarray, np.ndarray]]:
         """Unknowns of each plane that is simulated, course [m] and slope [-] of all nodes in it."""
-        yield ("w", "theta_y"), self.height, self.slope
+        yield UPRIGHT, self.height, self.slope
         if self.lateral is not None:
-            yield ("v", "theta_z"), self.lateral.y, self.lateral.slope
+            yield LEVEL, self.lateral.y, self.lateral.slope

@@ -23,9 +23,15 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.wires import SAME_PLACE
 
-# Nodes closer than this along the track belong to one station [m].
-SAME_STATION = 1e-6
+# Deflection and slope of a wire in the vertical plane, and in the lateral one.
+UPRIGHT, LEVEL = ("w", "theta_y"), ("v", "theta_z")
+# Unknowns of a group in a station above which solving by nodes is faster.
+_WIDEST_GROUP = 12
+# Types of stations that a line may have, each with loops of its own; of more the rarer ones are
+# filled up to a whole cross-section.
+MOST_STATION_TYPES = 4
 
 
 class Stations(NamedTuple):
@@ -48,7 +54,7 @@ class Stations(NamedTuple):
 def along_the_track(mesh: LineMesh) -> np.ndarray:
     """Nodes in the order along the track, those at one place in the order of the wires."""
     order = np.argsort(mesh.points[:, 0], kind="stable")
-    return order[np.lexsort((_wire_of_node(mesh)[order], _places(mesh)[order]))]
+    return order[np.lexsort((wire_of_node(mesh)[order], _places(mesh)[order]))]
 
 
 def stations_of(
@@ -87,7 +93,7 @@ def _beside(mesh: LineMesh, together: Mapping[str, str]) -> np.ndarray:
         pieces = [mesh.pieces(wire) for wire in (name, other)]
         sizes = [[piece.size for piece in own] for own in pieces]
         own, beside = mesh.wires[name], mesh.wires[other]
-        if sizes[0] != sizes[1] or np.abs(mesh.x(own) - mesh.x(beside)).max() > SAME_STATION:
+        if sizes[0] != sizes[1] or np.abs(mesh.x(own) - mesh.x(beside)).max() > SAME_PLACE:
             raise InputError(
                 f"without effects.relative_motion {name} and {other} need nodes side by side: the "
                 f"mesh has {own.size} and {beside.size} of them, not all at the same places; "
@@ -170,7 +176,7 @@ def _by_gaps(mesh: LineMesh) -> np.ndarray | None:
     for nodes in mesh.wires.values():
         index[nodes] = np.arange(nodes.size)
     droppers = mesh.droppers[np.argsort(mesh.x(mesh.droppers[:, 1]), kind="stable")]
-    of_wire = _wire_of_node(mesh)[droppers]
+    of_wire = wire_of_node(mesh)[droppers]
     if len(mesh.wires) != 2 or mesh.breaks or (np.sort(of_wire, axis=1) != [0, 1]).any():
         return None
     ends = {int(wire): index[droppers[of_wire == wire]] for wire in (0, 1)}
@@ -202,22 +208,17 @@ def _places(mesh: LineMesh) -> np.ndarray:
     order = np.argsort(mesh.points[:, 0], kind="stable")
     x = mesh.points[order, 0]
     result = np.empty(mesh.n_nodes, dtype=np.int64)
-    result[order] = np.cumsum(np.diff(x, prepend=x[:1]) > SAME_STATION)
+    result[order] = np.cumsum(np.diff(x, prepend=x[:1]) > SAME_PLACE)
     return result
 
 
-def _wire_of_node(mesh: LineMesh) -> np.ndarray:
+def wire_of_node(mesh: LineMesh) -> np.ndarray:
+    """Number of the wire of each node, (n_nodes,)."""
     wire = np.zeros(mesh.n_nodes, dtype=np.int64)
     for number, nodes in enumerate(mesh.wires.values()):
         wire[nodes] = number
     return wire
 
-
-# Unknowns of a group in a station above which solving by nodes is faster.
-_WIDEST_GROUP = 12
-# Types of stations that a line may have, each with loops of its own; of more the rarer ones are
-# filled up to a whole cross-section.
-MOST_STATION_TYPES = 4
 
 # Unknowns that are numbered together: those of each wire, by its name.
 Group = Mapping[str, tuple[str, ...]]
@@ -339,7 +340,7 @@ class Unknowns:
 
     def first_at(self, x: float) -> int:
         """Number of the first unknown of the station at a place along the track [m]."""
-        return self.within(x - 1e-6, np.inf)[0]
+        return self.within(x - SAME_PLACE, np.inf)[0]
 
     def stations_within(
         self, x_low: np.ndarray, x_high: np.ndarray

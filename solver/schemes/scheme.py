@@ -1,6 +1,6 @@
-"""A scheme is a way through a time step for line and pantographs; the default is one solve.
+"""Schemes: ways through a time step for line and pantographs.
 
-The default way is one solve for the free response, and a small exact problem.
+The default one solves for the free response once, and then a small exact problem.
 """
 
 from __future__ import annotations
@@ -20,6 +20,13 @@ from catenary.solver.contact.responses import Heads, LineResponse
 from catenary.solver.contact_problem.coupling import NOT_FINITE, Coupling, InnerSolution
 from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
 from catenary.solver.kernels import native
+
+# First guesses of what reserves elsewhere may lose [N] and of contact forces [N]; both grow when a
+# step shows that they were too small, and that step is repeated.
+_FIRST_MARGIN = 5.0
+_FIRST_BOUND = 200.0
+# No reserve is below it: no link is reported, but for one that is not finite.
+_NO_MARGIN = -np.finfo(float).max
 
 
 def find_crossings(interaction: ForcesOnLine, pantographs: Pantographs, time: float) -> None:
@@ -114,14 +121,6 @@ class Scheme(ABC):
 
     def destroy(self) -> None:  # noqa: B027  (many have none)
         """Free PETSc objects of the scheme's own. Collective."""
-
-
-# First guesses of what reserves elsewhere may lose [N] and of contact forces [N]; both grow when a
-# step shows that they were too small, and that step is repeated.
-_FIRST_MARGIN = 5.0
-_FIRST_BOUND = 200.0
-# No reserve is below it: no link is reported, but for one that is not finite.
-_NO_MARGIN = -np.finfo(float).max
 
 
 @dataclass

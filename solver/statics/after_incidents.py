@@ -45,11 +45,10 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows, reach
 from catenary.solver.model import beam
-from catenary.solver.model.axial_motion import tensioned_ends
-from catenary.solver.model.links import Direction
+from catenary.solver.model.axial_motion import shape_of, tensioned_ends
 from catenary.solver.model.loads import ShapeLoad
-from catenary.solver.model.matrices import OperatorBands, iterate_entries, whole_matrix
-from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.matrices import OperatorBands, iterate_sums, whole_matrix
+from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import switching_links
@@ -104,17 +103,17 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     load, energy = np.zeros(model.n_dofs), 0.0
     for wire, now in zip(problem.line.wires, after.line.wires, strict=True):
         pairs = mesh.elements(wire.name)
-        middle = mesh.x(pairs).mean(axis=1)
+        middle = mesh.middles(wire.name)
         lost = now.tension_at(middle) - wire.tension_at(middle)
         if not lost.any():
             continue
         for plane, course, slope in form.planes():
-            dofs, length = wire_elements(first, wire.name, plane)
-            shape = np.stack([course[pairs], slope[pairs]], axis=2).reshape(-1, 4)
+            dofs, length = first.wire_elements(wire.name, plane)
+            shape = shape_of(course, slope, pairs)
             pull = np.einsum("nij,nj->ni", beam.stiffness(length, 0.0, lost), shape)
             np.add.at(load, dofs, -pull)
             energy += 0.5 * float((shape * pull).sum())
-    unknowns, weights = _droppers(model, broken)
+    unknowns, weights = (part[broken] for part in model.droppers.direction)
     np.add.at(load, unknowns, form.dropper_force[broken, None] * weights)
     stored = first.dropper_slopes.energy_under(form.dropper_force)
     # One that was slack at rest held the energy of what it keeps of its stiffness.
@@ -122,8 +121,11 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
     stored[keeps] /= first.simulated.kept_ratio
     energy -= float(stored[broken].sum())
     if effects.needs_form(problem):
-        model, form, load = _about_rest(first, model, form)
-        _break_unstable(model)
+        try:
+            model, form, load = _about_rest(first, model, form)
+            refuse_unstable(model)
+        except InputError as error:
+            raise RunBroken(f"after an incident {error}") from None
     load[model.constrained] = 0.0
     unbalanced = np.flatnonzero(load)
     if unbalanced.size:
@@ -138,10 +140,7 @@ def _about_rest(
     droppers have there, and its load (n_dofs,)."""
     potential = Potential(first, changed, form, form.dropper_length)
     loads = dead_loads(changed) - dead_loads(first)
-    try:
-        rest = RestNearby(potential, loads, ends_stay=True).find()
-    except InputError as error:
-        raise RunBroken(f"after an incident {error}") from None
+    rest = RestNearby(potential, loads, ends_stay=True).find()
     about = rest.form
     if changed.simulated.tensioner is not None and about.along.size:
         # Stops are where they were: displacements count from the first rest.
@@ -161,13 +160,6 @@ def _about_rest(
     there = ChangedLine(model, now, load, 0.0)
     push = _compensation(there, moved, np.zeros(moved.size))
     return model, now, load - push
-
-
-def _break_unstable(model: Model) -> None:
-    try:
-        refuse_unstable(model)
-    except InputError as error:
-        raise RunBroken(f"after an incident {error}") from None
 
 
 def acceleration_jump(
@@ -227,12 +219,6 @@ def _compensation(line: ChangedLine, displacement: np.ndarray, velocity: np.ndar
     return total
 
 
-def _droppers(model: Model, which: np.ndarray) -> Direction:
-    """Directions of some of the droppers, ``which`` (n_droppers,) bool."""
-    unknowns, weights = model.droppers.direction
-    return Direction(unknowns[which], weights[which])
-
-
 def _times(
     model: Model, ownership: Ownership, stiffness: float, damping: float, values: np.ndarray
 ) -> np.ndarray:
@@ -240,9 +226,8 @@ def _times(
     collective."""
     first, n = ownership.first, ownership.n_local
     total = np.zeros(n)
-    for rows, columns, entries in iterate_entries(
-        model, first, ownership.last, 0.0, stiffness, damping
-    ):
+    sums = [(0.0, stiffness, damping)]
+    for rows, columns, (entries,) in iterate_sums(model, first, ownership.last, sums):
         total += np.bincount(rows - first, weights=entries * values[columns], minlength=n)
     return total
 

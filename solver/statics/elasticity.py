@@ -12,7 +12,7 @@ from scipy import linalg
 
 from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
-from catenary.meshgen.wires import Role
+from catenary.meshgen.wires import SAME_PLACE, Role
 from catenary.solver.effects.build_model import with_wires_apart
 from catenary.solver.model.link_directions import at_nodes, at_places
 from catenary.solver.model.matrices import OperatorBands
@@ -22,8 +22,6 @@ from catenary.solver.model.model import Model
 _FIRST_REACH, _STILL = 1500.0, 1e-13
 # Longest part of a stretch, whose places are solved for one by one in all of it [m].
 _LONGEST = 300.0
-# Places closer than this along the track are one [m].
-_SAME_PLACE = 1e-6
 # Numbers of solutions that are held at once.
 _AT_ONCE = 1 << 20
 
@@ -94,7 +92,7 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
     stiffness = OperatorBands(model, (0.0, 1.0, 0.0))
     parts = [_of_stretch(model, stiffness, *ends) for ends in itertools.pairwise(cuts.tolist())]
     x = np.concatenate([part.x for part in parts])
-    once = np.diff(x, prepend=-np.inf) > _SAME_PLACE  # a node at a cut is in both parts
+    once = np.diff(x, prepend=-np.inf) > SAME_PLACE  # a node at a cut is in both parts
     return Elasticity(x[once], np.concatenate([part.compliance for part in parts])[once])
 
 
@@ -171,13 +169,13 @@ def _places_in(model: Model, x_from: float, x_to: float) -> np.ndarray:
     """Places of the contact wires' nodes in a stretch, each once, (n,) [m]."""
     x = np.sort(model.mesh.x(np.concatenate(model.nodes_of(Role.CONTACT))))
     x = x[(x >= x_from - 1e-9) & (x <= x_to + 1e-9)]
-    return np.asarray(x[np.diff(x, prepend=-np.inf) > _SAME_PLACE])
+    return np.asarray(x[np.diff(x, prepend=-np.inf) > SAME_PLACE])
 
 
 def _is_there(model: Model, wire: str, x: np.ndarray) -> np.ndarray:
     """Whether one of the pieces of a wire runs over places, (n,) bool."""
     ends = (model.mesh.x(piece)[[0, -1]] for piece in model.mesh.pieces(wire))
-    return np.any([(x >= a - _SAME_PLACE) & (x <= b + _SAME_PLACE) for a, b in ends], axis=0)
+    return np.any([(x >= a - SAME_PLACE) & (x <= b + SAME_PLACE) for a, b in ends], axis=0)
 
 
 def _element_ends(model: Model, x_from: float, x_to: float) -> tuple[float, float]:
@@ -261,8 +259,8 @@ def middle_span(line: Line) -> tuple[float, float]:
     first, last = line.n_transition[0], line.n_spans - line.n_transition[1]
     wires = np.zeros(line.n_spans)
     for piece in (piece for wire in line.wires_of(Role.CONTACT) for piece in wire.pieces):
-        begun = masts[:-1] < piece.x[-1] + _SAME_PLACE
-        wires += begun & (masts[1:] > piece.x[0] - _SAME_PLACE)
+        begun = masts[:-1] < piece.x[-1] + SAME_PLACE
+        wires += begun & (masts[1:] > piece.x[0] - SAME_PLACE)
     running = np.arange(first, last)
     fewest = running[wires[first:last] == wires[first:last].min()]
     span = int(fewest[np.argmin(np.abs(fewest - (first + last) // 2))])

@@ -19,15 +19,13 @@ import numpy as np
 from scipy.sparse import linalg as sparse_linalg
 
 from catenary.base.errors import InputError
-from catenary.meshgen.geometry import SAME_CUT
 from catenary.meshgen.line import Line, SteadyArms
 from catenary.meshgen.mesh import LineMesh, reduced, with_nodes_at
-from catenary.meshgen.wires import Wire
+from catenary.meshgen.wires import SAME_PLACE, Wire
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.model import Model
-from catenary.solver.model.rest_shape import Equilibrium as Equilibrium
-from catenary.solver.model.rest_shape import LateralShape
+from catenary.solver.model.rest_shape import Equilibrium, LateralShape
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.potential import curve_load, dead_loads, exact_moments
 from catenary.solver.statics.repeated_ends import repeated_ends, settled
@@ -51,6 +49,10 @@ _MAX_PASSES = 30
 # Tolerance of the lift of steady arms, which the lateral plane gives, over the largest tension:
 # some ten times what round-off leaves of vertical forces on lines of 20 kN.
 _FORCE_TOLERANCE = 2e-11
+# An arm that hangs freely carries its weight up to this inclination, the wire what is beyond [rad].
+STEEPEST = np.deg2rad(20.0)
+# Arms that hold their wire's height stand no steeper [rad].
+_UPRIGHT = np.deg2rad(60.0)
 
 
 def find_form(
@@ -104,8 +106,8 @@ def lengths_to_cut(problem: Problem, mesh: LineMesh) -> np.ndarray:
     places = [problem.line.support_positions]
     for fittings in problem.line.fittings:
         places.append(np.array(fittings.x))
-        mesh = with_nodes_at(mesh, fittings.wire, places[-1], SAME_CUT)
-    joints = reduced(mesh, np.concatenate(places), SAME_CUT)
+        mesh = with_nodes_at(mesh, fittings.wire, places[-1], SAME_PLACE)
+    joints = reduced(mesh, np.concatenate(places), SAME_PLACE)
     cut, form = _cut(_as_installed(problem), joints, pushing=True, exact=True)
     return form.dropper_length + errors_of_length(problem, cut)
 
@@ -333,7 +335,7 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if supports.holds:
             held_at.append(mesh.supports[mesh.support_group == number])
             chain = mesh.wires[supports.holds]
-            nodes.append(chain[np.searchsorted(mesh.x(chain), mesh.x(held_at[-1]) - SAME_CUT)])
+            nodes.append(chain[np.searchsorted(mesh.x(chain), mesh.x(held_at[-1]) - SAME_PLACE)])
             heights.append(_wanted(model, line.wire(supports.holds), nodes[-1]))
     given = np.concatenate(nodes)
     _refuse_twice(mesh, given)
@@ -370,14 +372,13 @@ def _check(line: Line, mesh: LineMesh, form: Equilibrium, pushing: bool, lifted:
         cut <= 0,
         lambda i: f"would have a length of {cut[i]:.3f} m before {force[i]:.0f} N stretch it",
     )
-    weighted = form.dropper_force.any() and not pushing
-    slack = (form.dropper_force <= 0) & weighted
+    slack = (force <= 0) & (force.any() and not pushing)
     _refuse(
         line,
         mesh,
         slack,
         # Digits as they matter, so that a small force is not rounded to a zero with a sign.
-        lambda i: f"would be slack at rest (force {form.dropper_force[i] + 0.0:.3g} N)",
+        lambda i: f"would be slack at rest (force {force[i] + 0.0:.3g} N)",
         ", or the inclination of the steady arms, which lift the wire" if lifted else "",
     )
 
@@ -402,12 +403,6 @@ def _refuse(
         "dropper positions, line.encumbrance_m, the tensions or the droppers' stiffness"
         + more_to_change
     )
-
-
-# An arm that hangs freely carries its weight up to this inclination, the wire what is beyond [rad].
-STEEPEST = np.deg2rad(20.0)
-# Arms that hold their wire's height stand no steeper [rad].
-_UPRIGHT = np.deg2rad(60.0)
 
 
 def lateral_shape(

@@ -29,9 +29,10 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.model.axial_motion import WireEnd, ends_of
 from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model, same_matrices
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span
-from catenary.solver.statics.form_finding import Equilibrium, find_form, sound_form
+from catenary.solver.statics.form_finding import find_form, sound_form
 from catenary.solver.statics.rest_nearby import StiffLine
 
 
@@ -100,8 +101,7 @@ def stable_form(
     InputError
         As ``find_form``, and if the rest is unstable.
     """
-    own = None if sound is None else (sound.model, sound.form, sound.stiff)
-    model, form = find_form(problem, mesh, own)
+    model, form = find_form(problem, mesh, None if sound is None else sound[:3])
     refuse_unstable(model)
     return model, form
 
@@ -237,21 +237,21 @@ def refuse_lost_wire(model: Model, form: Equilibrium) -> None:
     InputError
         With the stretch of the run in which a head finds no wire.
     """
-    wires = model.nodes_of(Role.CONTACT)
+    wires = model.problem.line.wires_of(Role.CONTACT)
     if form.lateral is None or len(wires) == 1:
         return
     train, shape = model.problem.train, form.lateral
     halves = [place.data.strips.half_length for place in train.placements]
     half = np.nanmin([*halves, np.inf])
     trailing = max(place.behind for place in train.placements)
-    x = np.unique(np.concatenate([model.mesh.x(nodes) for nodes in wires]))
+    pieces = [piece for wire in wires for piece in model.mesh.pieces(wire.name)]
+    x = np.unique(np.concatenate([model.mesh.x(piece) for piece in pieces]))
     x = x[(x >= train.start - trailing) & (x <= train.end)]
     beside = np.full(x.size, np.inf)
-    for wire, nodes in zip(model.problem.line.wires_of(Role.CONTACT), wires, strict=True):
-        for piece in np.split(nodes, model.mesh.breaks.get(wire.name, [])):
-            place = model.mesh.x(piece)
-            aside = np.interp(x, place, np.abs(shape.y[piece]), left=np.inf, right=np.inf)
-            beside = np.minimum(beside, aside)
+    for piece in pieces:
+        place = model.mesh.x(piece)
+        aside = np.interp(x, place, np.abs(shape.y[piece]), left=np.inf, right=np.inf)
+        beside = np.minimum(beside, aside)
     lost = np.flatnonzero(np.isfinite(beside) & (beside > half))
     if lost.size:
         worst = lost[np.argmax(beside[lost])]
@@ -330,14 +330,13 @@ def tension_along(model: Model, form: Equilibrium) -> tuple[WireAtRest, ...]:
     """The wires of a line at rest whose effects let them move along the track."""
     every, found = ends_of(model), []
     for wire in model.problem.line.wires:
-        pairs = model.mesh.elements(wire.name)
-        x = model.mesh.x(pairs).mean(axis=1)
+        x = model.mesh.middles(wire.name)
         installed = wire.tension_at(x)
         tension = installed + form.gained_tension.get(wire.name, np.zeros(x.size))
         ends = tuple(end for end in every if end.wire == wire.name)
         moved, share = np.zeros(len(ends)), np.zeros(len(ends))
         for i, end in enumerate(ends):
-            element = int(np.flatnonzero((pairs == end.node).any(axis=1))[0])
+            element = end.element(model.mesh)
             share[i] = tension[element] / installed[element] - 1.0
             if form.along.size:
                 moved[i] = end.outwards * form.along[end.node]

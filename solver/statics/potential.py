@@ -21,12 +21,19 @@ import numpy as np
 from catenary.meshgen.line import SteadyArm
 from catenary.meshgen.wires import Wire
 from catenary.solver.model import beam
-from catenary.solver.model.axial_motion import curve_rows, rows_in_curve, shape_of
-from catenary.solver.model.model import Model, wire_elements
+from catenary.solver.model.axial_motion import (
+    curve_rows,
+    rows_in_curve,
+    shape_of,
+    slope_rows,
+)
+from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.wind import mean_load
 
-_LEVEL = ("v", "theta_z")
+# Components of a dropper's vector and of an arm's.
+_DROPPER, _ARM = ("u", "v", "w"), ("v", "w", "u")
 
 
 def dead_loads(model: Model) -> np.ndarray:
@@ -45,13 +52,13 @@ def dead_loads(model: Model) -> np.ndarray:
     if line.curve is not None:
         every = np.arange(model.mesh.n_nodes)
         share = line.curve.sideways_pull_at(model.mesh.x(every))
-        for sideways, own in zip(_LEVEL, ("w", "theta_y"), strict=True):
+        for sideways, own in zip(LEVEL, UPRIGHT, strict=True):
             load[model.dofs(every, sideways)] -= share * weight[model.dofs(every, own)]
     if wind is None:
         return load
     for wire in line.wires:
-        dofs, length = wire_elements(model, wire.name, _LEVEL)
-        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        dofs, length = model.wire_elements(wire.name, LEVEL)
+        middle = model.mesh.middles(wire.name)
         pull = mean_load(wind, model.problem.tunnels, wire, middle)
         np.add.at(load, dofs, pull[:, None] * beam.uniform_load(length))
         if line.curve is not None:
@@ -72,8 +79,8 @@ def curve_load(model: Model, form: Equilibrium | None) -> np.ndarray:
         return load
     for wire in model.problem.line.wires:
         upright, length = model.wire_elements(wire.name)
-        level, _ = wire_elements(model, wire.name, _LEVEL)
-        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        level, _ = model.wire_elements(wire.name, LEVEL)
+        middle = model.mesh.middles(wire.name)
         pull = wire.tension_at(middle) * length
         for dofs, rows in zip((upright, level), curve_rows(model, wire.name, form), strict=True):
             np.add.at(load, dofs, -pull[:, None] * rows)
@@ -88,7 +95,7 @@ def exact_moments(model: Model) -> np.ndarray:
     curve = line.curve if model.simulated.lateral else None
     for wire in line.wires:
         dofs, length = model.wire_elements(wire.name)
-        middle = model.mesh.x(model.mesh.elements(wire.name)).mean(axis=1)
+        middle = model.mesh.middles(wire.name)
         tension = wire.tension_at(middle)
         lacks = beam.moment_share(length, wire.bending_stiffness, tension) - 1.0
         moments = lacks[:, None] * beam.uniform_load(length) * np.array([0.0, 1.0, 0.0, 1.0])
@@ -98,13 +105,9 @@ def exact_moments(model: Model) -> np.ndarray:
             pull = curve.upright_curvature_at(middle) * tension
             np.add.at(load, dofs, pull[:, None] * moments)
             pull = curve.sideways_pull_at(middle) * weight + curve.curvature_at(middle) * tension
-            sideways, _ = wire_elements(model, wire.name, _LEVEL)
+            sideways, _ = model.wire_elements(wire.name, LEVEL)
             np.add.at(load, sideways, pull[:, None] * moments)
     return load
-
-
-# Components of a dropper's vector and of an arm's.
-_DROPPER, _ARM = ("u", "v", "w"), ("v", "w", "u")
 
 
 class Potential:
@@ -125,7 +128,12 @@ class Potential:
         if not model.simulated.lateral:
             self._parts = [k for k in self._parts if _DROPPER[k] != "v"]
         self._droppers_were = self._pulls(known, known.dropper_force)
-        self._arms = _arms(model, known)
+        kinds = [] if known.lateral is None else model.problem.line.steady_arms
+        self._arms = [
+            _Arms(model, known, number, arms.kind)
+            for number, arms in enumerate(kinds)
+            if arms.kind.length > 0.0
+        ]
 
     def reserve(self, form: Equilibrium) -> np.ndarray:
         """Forces of droppers if they could push, (n_droppers,) [N]."""
@@ -234,7 +242,7 @@ class _Wire:
         self._other_bending = other_bending if other_bending.any() else None
         self._planes = []
         for plane, course, slope in known.planes():
-            dofs, _ = wire_elements(model, wire.name, plane)
+            dofs, _ = model.wire_elements(wire.name, plane)
             self._planes.append((dofs, shape_of(course, slope, pairs)))
         self._curve, self._ends = model.problem.line.curve, ends
         self._curved = self._in_curve(np.zeros(model.n_dofs))
@@ -255,7 +263,7 @@ class _Wire:
         curved = self._in_curve(0.5 * moved)
         for number, (dofs, shape) in enumerate(self._planes):
             bent = moved[dofs]
-            rows = self._slope_rows(shape + 0.5 * bent) + curved[number]
+            rows = slope_rows(self._length, shape + 0.5 * bent, self._taut) + curved[number]
             strain += (rows * bent).sum(axis=1)
         return np.asarray(self._had + self._axial * strain)
 
@@ -273,7 +281,9 @@ class _Wire:
             if self._other_bending is not None:
                 pull += np.einsum("nij,nj->ni", self._other_bending, shape)
             if other.any():
-                pull += other[:, None] * (self._slope_rows(shape) + self._curved[number])
+                pull += other[:, None] * (
+                    slope_rows(self._length, shape, self._taut) + self._curved[number]
+                )
             if gained.any():
                 pull += gained[:, None] * np.einsum("nij,nj->ni", self._taut, bent)
             # Where the track twists each plane sees what has moved in the other one.
@@ -281,13 +291,8 @@ class _Wire:
             pull += taut[:, None] * (curved[number] - self._curved[number])
             np.add.at(total, dofs, pull)
 
-    def _slope_rows(self, shape: np.ndarray) -> np.ndarray:
-        """Derivatives of the mean strain by the unknowns of a plane in a shape, (n, 4), on straight
-        track."""
-        return np.asarray(np.einsum("nij,nj->ni", self._taut, shape) / self._length[:, None])
-
     def _in_curve(self, moved: np.ndarray) -> tuple[np.ndarray, ...]:
-        """What a curve adds to them in each plane, (n, 4); nothing without lateral motion."""
+        """What a curve adds to ``slope_rows`` in each plane, (n, 4); zero in one plane."""
         if len(self._planes) == 1:
             return (np.zeros((len(self._ends), 4)),)
         shapes = (shape + moved[dofs] for dofs, shape in self._planes)
@@ -328,12 +333,3 @@ class _Arms:
         """On the wire: lateral, upward, and along the track, (n, 3) [N]."""
         tension, unit = self.tension(moved)
         return np.asarray(tension[:, None] * unit)
-
-
-def _arms(model: Model, known: Equilibrium) -> list[_Arms]:
-    if known.lateral is None:
-        return []
-    kinds = [arms.kind for arms in model.problem.line.steady_arms]
-    return [
-        _Arms(model, known, number, kind) for number, kind in enumerate(kinds) if kind.length > 0.0
-    ]

@@ -21,14 +21,23 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.model.model import Model
-from catenary.solver.model.unknowns import SAME_STATION
 from catenary.solver.problem.ends import Fixed
 from catenary.solver.problem.problem import Problem
 
 # Change from turn to turn of a line that is settled [m]; one that is round-off of its rest if it
-# falls no more, as of slack lines whose rest is found less exactly; and the most turns.
-_SETTLED, _ROUND_OFF, _MOST_TURNS = 1e-14, 1e-11, 40
+# falls no more, as of slack lines whose rest is found less exactly.
+_SETTLED, _ROUND_OFF = 1e-14, 1e-11
+# Change of ends from turn to turn that are settled [m], and one that is round-off of rests which
+# Newton's method finds to 1e-9 m, if it falls no more.
+_MOVES_SETTLED, _MOVES_ROUND_OFF = 1e-12, 1e-8
+# Turns at most.
+MOST_TURNS = 40
+# Loads that are nothing, over the largest: round-off of droppers of 1e6 N/m.
+_NOTHING = 1e-6
+# Unknowns of each plane, and which mast before the end moves as it does: 0 is the last one.
+_FOLLOWED = {"w": 0, "theta_y": 0, "v": 1, "theta_z": 1}
 
 
 class RepeatedEnds(NamedTuple):
@@ -64,7 +73,7 @@ def repeated_ends(model: Model) -> RepeatedEnds:
 def _node_at(model: Model, wire: str, x: float) -> int:
     """The node of a wire at a place [m], -1 if there is none."""
     nodes = model.mesh.wires[wire]
-    at = np.flatnonzero(np.abs(model.mesh.x(nodes) - x) < SAME_STATION)
+    at = np.flatnonzero(np.abs(model.mesh.x(nodes) - x) < SAME_PLACE)
     return int(nodes[at[0]]) if at.size else -1
 
 
@@ -77,7 +86,7 @@ def settled(turn: Callable[[np.ndarray], np.ndarray], first: np.ndarray) -> np.n
         If they do not settle.
     """
     values, before = first, np.inf
-    for _ in range(_MOST_TURNS):
+    for _ in range(MOST_TURNS):
         found = turn(values)
         change = np.abs(found - values).max(initial=0.0)
         values = found
@@ -85,19 +94,15 @@ def settled(turn: Callable[[np.ndarray], np.ndarray], first: np.ndarray) -> np.n
         if change < _SETTLED * scale or before <= change < _ROUND_OFF * scale:
             return values
         before = change
-    raise InputError(
+    raise unsettled(change)
+
+
+def unsettled(change: float) -> InputError:
+    """The error of a line whose end changes [m] by as much from turn to turn."""
+    return InputError(
         "the line at rest does not settle where line.ends says that it is periodic: its end still "
         f"moves by {1e3 * change:.2g} mm when it hangs as the span before does; end it otherwise"
     )
-
-
-# Loads that are nothing, over the largest: round-off of droppers of 1e6 N/m.
-_NOTHING = 1e-6
-# Change of ends from turn to turn that are settled [m], and one that is round-off of rests which
-# Newton's method finds to 1e-9 m, if it falls no more.
-_MOVES_SETTLED, _MOVES_ROUND_OFF = 1e-12, 1e-8
-# Unknowns of each plane, and which mast before the end moves as it does: 0 is the last one.
-_FOLLOWED = {"w": 0, "theta_y": 0, "v": 1, "theta_z": 1}
 
 
 class EndsThatFollow(NamedTuple):
@@ -138,25 +143,20 @@ def ends_that_follow(model: Model, loads: np.ndarray) -> EndsThatFollow:
     x, masts = model.mesh.points[:, 0], model.problem.line.support_positions
     largest = float(np.abs(loads).max(initial=0.0))
     sides, pairs = [False, False], [np.zeros((0, 2), dtype=np.int64)]
+    followed = {name: mast for name, mast in _FOLLOWED.items() if name in model.unknowns}
     for side, (end, mast) in enumerate((masts[:2], masts[:-3:-1])):
-        at = np.abs(x[repeated.ends] - end) < SAME_STATION
+        at = np.abs(x[repeated.ends] - end) < SAME_PLACE
         low, high = sorted((float(end), float(mast)))
-        within = np.flatnonzero((x > low + SAME_STATION) & (x < high - SAME_STATION))
-        on_span = np.abs(loads[_dofs(model, within)]).max(initial=0.0)
+        within = np.flatnonzero((x > low + SAME_PLACE) & (x < high - SAME_PLACE))
+        inner = np.concatenate([model.dofs(within, name) for name in followed])
+        on_span = np.abs(loads[inner]).max(initial=0.0)
         if not at.any() or on_span <= _NOTHING * largest:
             continue
         sides[side] = True
-        for name, number in _FOLLOWED.items():
-            if name in model.unknowns:
-                nodes = repeated.ends[at], repeated.masts[number][at]
-                pairs.append(np.stack([model.dofs(one, name) for one in nodes], axis=1))
+        for name, number in followed.items():
+            nodes = repeated.ends[at], repeated.masts[number][at]
+            pairs.append(np.stack([model.dofs(one, name) for one in nodes], axis=1))
     # Wires that move together share unknowns.
     found = np.unique(np.concatenate(pairs), axis=0)
-    ends, followed = found[~np.isin(found[:, 0], model.constrained)].T
-    return EndsThatFollow(ends, followed, (sides[0], sides[1]))
-
-
-def _dofs(model: Model, nodes: np.ndarray) -> np.ndarray:
-    """Numbers of all unknowns of nodes in any plane."""
-    names = [name for name in _FOLLOWED if name in model.unknowns]
-    return np.concatenate([model.dofs(nodes, name) for name in names])
+    ends, leading = found[~np.isin(found[:, 0], model.constrained)].T
+    return EndsThatFollow(ends, leading, (sides[0], sides[1]))

@@ -26,30 +26,32 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.model.axial_motion import WireEnd, tensioned_ends
 from catenary.solver.model.link_directions import dropper_directions
+from catenary.solver.model.matrices import stiffness_matrix
 from catenary.solver.model.model import Model, same_matrices
 from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.defects import HardSpot
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.potential import Potential, dead_loads
-from catenary.solver.statics.repeated_ends import NO_ENDS, ends_that_follow
+from catenary.solver.statics.repeated_ends import (
+    MOST_TURNS,
+    NO_ENDS,
+    ends_that_follow,
+    unsettled,
+)
 
 # Displacements change by less than this where Newton's method ends [m].
 _SETTLED = 1e-9
 _MOST_STEPS = 40
 # A step that moves a line by more goes nowhere [m].
 _FARTHEST = 1e3
-# Turns of ends that follow, at most.
-_MOST_TURNS = 40
 # Steps at first in which droppers switch as they are, where matrices depend on the shape.
 _SWITCHING = 12
 # Passes in which all switch at once, before one at a time does, and the most after these.
 _ALL_AT_ONCE = 40
 # Forces below this are none [N]: what a dropper of 1e6 N/m pulls when it stretches by 1e-13 m.
 _NO_FORCE = 1e-7
-
-
-# Forces that are one [N].
-_TINY = 1e-6
+# Tensions that differ by less are one [N].
+_SAME_TENSION = 1e-6
 
 
 class TensionedEnd:
@@ -69,9 +71,8 @@ class TensionedEnd:
         self.end, self._travel = end, tensioner.travel
         self.unknown = int(model.dofs(np.array([end.node]), "u")[0])
         self._low, self._high = tensioner.band(end.wire, wire, model.problem.gravity)
-        pairs = model.mesh.elements(end.wire)
-        self._element = int(np.flatnonzero((pairs == end.node).any(axis=1))[0])
-        self._installed = float(wire.tension_at(model.mesh.x(pairs[self._element]).mean()))
+        self._element = end.element(model.mesh)
+        self._installed = float(wire.tension_at(model.mesh.middles(end.wire)[self._element]))
         self.pull = wire.tension if tensioner.turns else None
         self.held_at = 0.0
 
@@ -82,9 +83,9 @@ class TensionedEnd:
         tension = self._installed + form.gained_tension[self.end.wire][self._element]
         if self.pull is None:
             # A stop takes up what the weights pull more, and keeps what the wire pulls more.
-            if tension < self._low - _TINY and self.held_at <= 0.0:
+            if tension < self._low - _SAME_TENSION and self.held_at <= 0.0:
                 self.pull = self._low
-            elif tension > self._high + _TINY and self.held_at >= 0.0:
+            elif tension > self._high + _SAME_TENSION and self.held_at >= 0.0:
                 self.pull = self._high
         elif self._travel is not None and abs(outwards) > self._travel:
             self.held_at = float(np.copysign(self._travel, outwards))
@@ -119,9 +120,6 @@ class StiffLine:
     """
 
     def __init__(self, model: Model) -> None:
-        # PETSc is not loaded by a check of a sound line.
-        from catenary.solver.model.matrices import stiffness_matrix
-
         self.model, self.matrix = model, stiffness_matrix(model)
 
     def moved(self, load: np.ndarray) -> np.ndarray:
@@ -192,7 +190,7 @@ class RestNearby:
         moved = np.zeros(self._model.n_dofs)
         slack = self._switches & (potential.reserve(potential.known) < -_NO_FORCE)
         ends, before = self._follow, np.inf
-        for _ in range(_MOST_TURNS):
+        for _ in range(MOST_TURNS):
             rest = self._find(moved, slack)
             if not ends.ends.size:
                 return rest
@@ -202,11 +200,7 @@ class RestNearby:
             before, moved = change, rest.moved.copy()
             moved[ends.ends] = moved[ends.masts]
             slack = rest.gap > 0.0
-        raise InputError(
-            "the line at rest does not settle where line.ends says that it is periodic: its end "
-            f"still moves by {1e3 * change:.2g} mm when it moves as the span before; end it "
-            "otherwise"
-        )
+        raise unsettled(change)
 
     def _find(self, moved: np.ndarray, slack: np.ndarray) -> Rest:
         """The rest near a displacement, from droppers that are slack there, with ends that follow
@@ -415,9 +409,8 @@ def errors_of_length(problem: Problem, cut: Model) -> np.ndarray:
 
 def _refuse_slack_wires(model: Model, form: Equilibrium) -> None:
     for name, gained in form.gained_tension.items():
-        wire, pairs = model.problem.line.wire(name), model.mesh.elements(name)
-        middle = model.mesh.x(pairs).mean(axis=1)
-        left = wire.tension_at(middle) + gained
+        middle = model.mesh.middles(name)
+        left = model.problem.line.wire(name).tension_at(middle) + gained
         if left.min() <= 0.0:
             raise InputError(
                 f"{name} would be slack{where(model)} (tension {left.min() + 0.0:.3g} N at "

@@ -18,6 +18,9 @@ from catenary.solver.model import beam
 from catenary.solver.model.alike import alike
 from catenary.solver.model.model import Model
 
+# Elements whose matrices are summed at once.
+_AT_ONCE = 1 << 10
+
 
 class Part(NamedTuple):
     """Elements; like elements share a matrix.
@@ -101,10 +104,6 @@ def columns_of(parts: list[Part], columns: np.ndarray, size: int) -> sparse.csc_
     for part in parts if columns.size else ():
         near.append(part.only(np.isin(part.dofs, columns).any(axis=1)))
     return summed(near, size)[:, columns] if near else sparse.csc_matrix((size, columns.size))
-
-
-# Elements whose matrices are summed at once.
-_AT_ONCE = 1 << 10
 
 
 class BandedFactors:

@@ -2,7 +2,7 @@
 
 A march depends on a parameter through its set-up only: matrices and links of the line, the wires'
 shape at rest, heads, contact law, train. These are differentiated here by central differences of
-set-ups, which cost no march; `tangent_steps` takes the derivatives through the march without a
+set-ups, which cost no march; `tangents.march` takes the derivatives through the march without a
 further approximation.
 """
 
@@ -17,7 +17,7 @@ from scipy import sparse
 
 from catenary.base.errors import InputError
 from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.interface import N_DRIVE, drive_width, named
+from catenary.mbs.interface import N_DRIVE, drive_width, drives_by_name
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
@@ -266,7 +266,7 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
             if models[0].steps_as(models[1]):
                 # A base elsewhere is a base that is raised.
                 lower, upper = (np.array(model.base_height) for model in models)
-                named(drives[:, number])["base"] += derivative(lower, upper, step)
+                drives_by_name(drives[:, number])["base"] += derivative(lower, upper, step)
                 models = []
             beside = [model.stepped for model in models]
             return native.HeadChange(*_NO_STEP, state, beside, step)

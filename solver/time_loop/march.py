@@ -34,6 +34,7 @@ from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.linear.petsc_solvers import wants_single_steps, wants_solution
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.defects import Happened, LineIncident, in_steps
 from catenary.solver.problem.problem import Problem, steps_of
 from catenary.solver.schemes.make_scheme import Parts, make_parts
@@ -46,7 +47,6 @@ from catenary.solver.statics.after_incidents import (
     unchanged,
 )
 from catenary.solver.statics.elasticity import Elasticity
-from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.time_loop.compiled_steps import compiled_steps
 from catenary.solver.time_loop.ts_stepper import Stepper, ts_of
 from catenary.solver.time_loop.views.observer_list import ObserverList
@@ -94,7 +94,7 @@ class March:
     Parameters
     ----------
     comm : mpi4py communicator
-    problem, model, form : arguments and result of ``equilibrium.find_form``, on all ranks
+    problem, model, form : arguments and result of ``form_finding.find_form``, on all ranks
     elasticity : of the contact wires in a running span, for the height at which static forces are
         defined
     """

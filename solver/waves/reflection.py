@@ -46,6 +46,10 @@ from catenary.solver.ends import (
 from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AbsorbingLayer, Periodic
 
+# epsilon [1/s], and the least group velocity of a wave that counts as one that travels [m/s], and
+# what of its amplitude is left after a span.
+_GROWTH, _SLOWEST, _LEFT = 1e-3, 2.0, 0.01
+
 
 class Answer(NamedTuple):
     """Waves that a unit force at one place of a wire makes, at f frequencies.
@@ -62,7 +66,7 @@ class Answer(NamedTuple):
     near: np.ndarray
 
 
-def answer(wire: Conductor, omega: np.ndarray) -> Answer:
+def answer_of(wire: Conductor, omega: np.ndarray) -> Answer:
     """The answer of an endless wire at angular frequencies (f,), positive [1/s].
 
     Without bending stiffness nothing falls off but at once.
@@ -99,7 +103,7 @@ def scattered(
     back, onward : (f, n, n) complex, amplitude on the wire of the row of a unit wave on that of the
         column
     """
-    answers = [answer(wire, omega) for wire in wires]
+    answers = [answer_of(wire, omega) for wire in wires]
     one = np.eye(len(wires))
     wave = np.stack([a.wave for a in answers], axis=1)[:, :, None] * one
     whole = np.stack([a.wave - a.near for a in answers], axis=1)[:, :, None] * one
@@ -118,7 +122,7 @@ def change_of_wire(
     stiffness; deflection, slope, moment and vertical force are continuous. For strings the
     amplitudes are (Z1 - Z2) / (Z1 + Z2) and 2 Z1 / (Z1 + Z2).
     """
-    one, two = answer(first, omega), answer(second, omega)
+    one, two = answer_of(first, omega), answer_of(second, omega)
     # exp(-i k x) on the left, R exp(i k x) + N exp(q x) there, T exp(-i k x) + M exp(-q x) beyond.
     exponents = [1j * one.wavenumber, one.decay + 0j, -1j * two.wavenumber, -two.decay + 0j]
     kinds = [first, first, second, second]
@@ -133,11 +137,6 @@ def _at_joint(exponent: np.ndarray, wire: Conductor) -> np.ndarray:
     """Deflection, slope, moment and vertical force of exp(a x) at x = 0, (f, 4)."""
     a, bending = exponent, wire.bending_stiffness
     return np.stack([np.ones_like(a), a, bending * a**2, wire.tension * a - bending * a**3], axis=1)
-
-
-# epsilon [1/s], and the least group velocity of a wave that counts as one that travels [m/s], and
-# what of its amplitude is left after a span.
-_GROWTH, _SLOWEST, _LEFT = 1e-3, 2.0, 0.01
 
 
 @dataclass(frozen=True)

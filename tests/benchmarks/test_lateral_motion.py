@@ -21,7 +21,7 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.links import Direction, law
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics
 from catenary.solver.statics.line_at_rest import line_at_rest
-from catenary.solver.wind import along
+from catenary.solver.wind import forces_along
 
 PLANE = ("v", "theta_z")
 WIND = 8.0  # [N/m]
@@ -40,7 +40,7 @@ def build_of(name: str) -> Callable[[ModelBuilder], None]:
     def build(builder: ModelBuilder) -> None:
         for wire in (CONTACT_WIRE, MESSENGER_WIRE):
             builder.add_wire(wire, PLANE)
-            unknowns, weights = along(builder.model, wire, PLANE)
+            unknowns, weights = forces_along(builder.model, wire, PLANE)
             even = weights @ np.full(weights.shape[1], WIND)
             if name == "with wind":
                 builder.add_load(ShapeLoad(unknowns, even))
@@ -48,7 +48,7 @@ def build_of(name: str) -> Callable[[ModelBuilder], None]:
                 builder.add_load(ShapeLoad(unknowns, even, harmonics([0.5], [1.0], [0.0])))
             elif name == "with gusts":
                 points = np.arange(0.0, builder.mesh.points[:, 0].max() + 5.0, 5.0)
-                unknowns, weights = along(builder.model, wire, PLANE, points)
+                unknowns, weights = forces_along(builder.model, wire, PLANE, points)
                 builder.add_load(FieldLoad(unknowns, weights, 0.05, gusts(points)))
             elif name == "a function":
                 builder.add_load(FunctionLoad("wind", unknowns, by_function(even)))

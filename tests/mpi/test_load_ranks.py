@@ -20,7 +20,7 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FieldLoad, FunctionLoad, ShapeLoad, harmonics
 from catenary.solver.problem.defects import DropperBreak
 from catenary.solver.statics.line_at_rest import line_at_rest_on_all
-from catenary.solver.wind import along
+from catenary.solver.wind import forces_along
 
 WORLD = MPI.COMM_WORLD
 SCENE = (
@@ -38,7 +38,7 @@ def blow(builder: ModelBuilder) -> None:
     """One load of each kind, along all of both wires."""
     for wire in (CONTACT_WIRE, MESSENGER_WIRE):
         x = builder.mesh.x(builder.mesh.wires[wire])
-        unknowns, weights = along(builder.model, wire, ("w", "theta_y"))
+        unknowns, weights = forces_along(builder.model, wire, ("w", "theta_y"))
         builder.add_load(ShapeLoad(unknowns, weights @ np.full(x.size, 2.0)))
         builder.add_load(
             ShapeLoad(unknowns, weights @ np.cos(0.1 * x), harmonics([2.0], [3.0], [0.0]))

@@ -18,8 +18,8 @@ from numpy.polynomial import Polynomial
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding import Equilibrium
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 

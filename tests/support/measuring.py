@@ -20,8 +20,8 @@ from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Numerics, Problem
-from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March, Outcome
 from catenary.solver.time_loop.views.observers import NEVER, Observer, Stage, StepView

@@ -22,12 +22,12 @@ from catenary.mbs.head.stepping import Raising
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.beam import shape_slopes, shape_values
-from catenary.solver.model.matrices import iterate_entries
+from catenary.solver.model.matrices import iterate_sums
 from catenary.solver.model.model import Model
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import some_of, switching_links
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Placement, Problem
-from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.wind import airflow
 
 
@@ -127,12 +127,8 @@ class WholeSystem:
         wires = np.tile(self._wire.ravel(), self.heads.size)
         rows, columns = np.concatenate([heads, wires]), np.concatenate([wires, heads])
         parts = [(rows, columns, np.zeros((3, rows.size)))]
-        for which in range(3):
-            coefficients = np.eye(3)[which]
-            for i, j, value in iterate_entries(model, 0, model.n_dofs, *coefficients):
-                values = np.zeros((3, i.size))
-                values[which] = value
-                parts.append((i, j, values))
+        each = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+        parts += iterate_sums(model, 0, model.n_dofs, each)
         held = np.zeros((3, self._held.size))
         held[1] = 1.0
         parts.append((self._held, self._held, held))

@@ -11,7 +11,7 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.meshgen.wires import End
 from catenary.solver.model import beam
 from catenary.solver.model.model import Model
-from catenary.solver.statics.form_finding import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 
 
 def absolute_rest(

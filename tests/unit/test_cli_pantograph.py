@@ -14,7 +14,7 @@ from scenes import load_scene, problem_of, shipped
 
 from catenary.cases.scene.input.case_files import read_toml
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.response import of_chain
+from catenary.mbs.response import chain_model
 
 
 def invoke(*words: str) -> Any:
@@ -41,7 +41,7 @@ def test_receptance_is_that_of_the_masses(written: tuple[Path, str]) -> None:
     ]
     frequency, real, imaginary = np.array(rows, dtype=float).T
     check("frequencies [Hz]", frequency, np.geomspace(0.2, 40.0, 31), within=1e-8)
-    chain = of_chain(LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0)))
+    chain = chain_model(LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0)))
     expected = chain.receptance(frequency)
     found = real + 1j * imaginary
     # All digits are written: round-off at a resonance of quality 7.

@@ -34,8 +34,9 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.channels.header import line_datasets
 from catenary.postproc.record.snapshots.contents import RecordedLine, blocks_of
 from catenary.solver.model.beam import uniform_load
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Damping
-from catenary.solver.statics.form_finding import Equilibrium, find_form
+from catenary.solver.statics.form_finding import find_form
 
 GRAVITY = 9.81
 

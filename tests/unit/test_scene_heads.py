@@ -15,7 +15,7 @@ from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.scene import end_of
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
-from catenary.mbs.vehicle import Harmonic, Irregularity, Table, VehicleMotion
+from catenary.mbs.vehicle import Harmonic, Irregularity, Spline, VehicleMotion
 
 CASE = "ac_simple"
 KIND = "pantographs.three_masses"
@@ -80,11 +80,11 @@ def test_a_vehicle_is_the_sum_of_what_its_tables_give() -> None:
     track = Irregularity("fra_6", 3.0, 100.0, 5)
     assert problem_of(scene).train.vehicle == VehicleMotion(
         (
-            Table((0, 10, 20, 30), (0, 0.01, 0.02, 0)),
+            Spline((0, 10, 20, 30), (0, 0.01, 0.02, 0)),
             Harmonic(0.01, 1.5, math.pi / 2),
             track,
         ),
-        (Table((0, 500, 1000, 2000), (0, 0.05, 0, 0.01), along_track=True), track),
+        (Spline((0, 500, 1000, 2000), (0, 0.05, 0, 0.01), along_track=True), track),
     )
 
 

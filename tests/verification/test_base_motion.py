@@ -30,7 +30,7 @@ from catenary.mbs.vehicle import (
     Harmonic,
     Irregularity,
     Spectrum,
-    Table,
+    Spline,
     VehicleMotion,
 )
 
@@ -207,9 +207,9 @@ def test_velocities_and_accelerations_are_derivatives_of_places() -> None:
         (
             Irregularity("fra_6", SHORTEST, LONGEST, 3),
             Harmonic(0.01, 1.2, 0.3),
-            Table(points, tuple(0.05 * np.sin(np.array(points) / 40.0)), along_track=True),
+            Spline(points, tuple(0.05 * np.sin(np.array(points) / 40.0)), along_track=True),
         ),
-        (Table((0.0, 1.0, 2.0, 4.0), (0.0, 0.02, 0.01, 0.03)),),
+        (Spline((0.0, 1.0, 2.0, 4.0), (0.0, 0.02, 0.01, 0.03)),),
     )
     base, h = BaseMotion(vehicle, 100.0, 70.0), 1e-3
     for time in (0.5, 1.7, 2.9):
@@ -242,7 +242,7 @@ def test_a_vehicle_that_stands_higher_throughout_is_a_base_that_does() -> None:
     """In a march: both put the spring on the base 0.1 m higher. Round-off of forces of 200 N."""
     line = en50318_line(3)
     runs = []
-    higher = VehicleMotion((Table((0.0, 200.0), (0.1, 0.1), along_track=True),))
+    higher = VehicleMotion((Spline((0.0, 200.0), (0.1, 0.1), along_track=True),))
     for vehicle, height, more in ((higher, 5.4, {"vehicle_motion"}), (None, 5.5, set())):
         ours = replace(train(70.0, 30.0, 120.0, nominal_height=height), vehicle=vehicle)
         problem = problem_of(line, WHOLE | more, train=ours, numerics=numerics(2e-3))

@@ -16,8 +16,8 @@ from small_lines import BARE, FREE_MASS, bare_wires, mesh_of, numerics, problem_
 
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.wires import Conductor
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.time_loop.views.observers import StepView
 
 RIGID = Conductor(tension=20e3, mass_per_length=1e15, bending_stiffness=195.0)

@@ -26,9 +26,10 @@ from catenary.meshgen.topologies.line_data import LineData
 from catenary.solver.kernels import native
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.defects import LooseClamp
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding import Equilibrium, find_form
+from catenary.solver.statics.form_finding import find_form
 
 # At rest droppers of the line below carry 125 to 167 N. Of these curves the first stiffens step by
 # step, as ropes do; the second is softer to both sides of rest, and stiffer again beyond.

@@ -17,8 +17,9 @@ from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.pantographs import nominal_height_rule
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.elasticity import Elasticity, elasticity, middle_span
-from catenary.solver.statics.form_finding import Equilibrium, find_form
+from catenary.solver.statics.form_finding import find_form
 
 
 def at_rest(line: Line) -> tuple[Model, Equilibrium]:

@@ -23,7 +23,7 @@ from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.form_finding import find_form
-from catenary.solver.wind import along
+from catenary.solver.wind import forces_along
 
 NAME = "lateral_wind"
 PLANE = ("v", "theta_z")
@@ -33,7 +33,7 @@ WIND = 8.0  # [N/m] on both wires
 def build_lateral(builder: ModelBuilder) -> None:
     for wire in (CONTACT_WIRE, MESSENGER_WIRE):
         builder.add_wire(wire, PLANE)
-        unknowns, weights = along(builder.model, wire, PLANE)
+        unknowns, weights = forces_along(builder.model, wire, PLANE)
         builder.add_load(ShapeLoad(unknowns, weights @ np.full(weights.shape[1], WIND)))
     builder.hold(builder.mesh.anchors, "v")
 

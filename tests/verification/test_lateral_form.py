@@ -19,9 +19,9 @@ from catenary.meshgen.line import Curve, DropperKind, SteadyArm
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
-from catenary.solver.model.rest_shape import LateralShape
+from catenary.solver.model.rest_shape import Equilibrium, LateralShape
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.form_finding import Equilibrium, find_form
+from catenary.solver.statics.form_finding import find_form
 
 # Of an element, what it takes off a chord at a kink.
 ROUNDED = 0.12

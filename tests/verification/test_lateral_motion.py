@@ -29,7 +29,7 @@ from small_lines import (
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.wires import Conductor
 from catenary.solver.statics.form_finding import find_form
-from catenary.solver.wind import along
+from catenary.solver.wind import forces_along
 
 LATERAL = frozenset({"lateral_motion"})
 EPS = np.finfo(float).eps
@@ -66,7 +66,7 @@ def test_uniform_wind_blows_a_staggered_wire_off_as_far_as_its_closed_form() -> 
     mesh = mesh_of(line, 80)
     model, form = find_form(problem_of(line, HANGING | LATERAL), mesh)
     load = np.zeros(model.n_dofs)
-    unknowns, weights = along(model, CONTACT_WIRE, PLANE)
+    unknowns, weights = forces_along(model, CONTACT_WIRE, PLANE)
     load[unknowns] += weights @ np.full(weights.shape[1], wind)
     blown = solve_free(matrix_of(model, stiffness=1.0), model, load)
     nodes = mesh.wires[CONTACT_WIRE]

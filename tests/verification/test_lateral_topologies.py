@@ -12,8 +12,9 @@ from scenes import load_scene, mesh_of, problem_of
 
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.model.model import Model
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.problem import Damping, Problem
-from catenary.solver.statics.form_finding import Equilibrium, find_form
+from catenary.solver.statics.form_finding import find_form
 from catenary.solver.time_loop.views.observers import Observer, StepView
 
 EPS = np.finfo(float).eps

@@ -20,6 +20,7 @@ from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.link_directions import between_nodes
 from catenary.solver.model.links import PULLS, law
 from catenary.solver.model.model import Model
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.defects import (
     Defect,
     HardSpot,
@@ -32,7 +33,7 @@ from catenary.solver.problem.defects import (
     WrongTension,
 )
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.form_finding import Equilibrium, find_form
+from catenary.solver.statics.form_finding import find_form
 
 SLACKENING = frozenset({"dropper_slackening"})
 EFFECTS = frozenset(

@@ -29,7 +29,7 @@ from catenary.solver.effects.effect import Effect
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import FieldLoad, ShapeLoad, constant, harmonics, table
 from catenary.solver.problem.contact_laws import LinearLaw
-from catenary.solver.wind import along
+from catenary.solver.wind import forces_along
 
 DENSITY, SPEED = EN_CONTACT_WIRE.mass_per_length, EN_CONTACT_WIRE.wave_speed
 PLANE = ("w", "theta_y")
@@ -68,7 +68,7 @@ def uniform(course: object) -> Build:
     """A load per length on all of the contact wire times a function of time."""
 
     def build(builder: ModelBuilder) -> None:
-        unknowns, weights = along(builder.model, CONTACT_WIRE, PLANE)
+        unknowns, weights = forces_along(builder.model, CONTACT_WIRE, PLANE)
         forces = weights @ np.full(weights.shape[1], LOAD)
         builder.add_load(ShapeLoad(unknowns, forces, course))  # type: ignore[arg-type]
 
@@ -123,7 +123,7 @@ def test_a_harmonic_load_on_one_mode_follows_its_oscillator(scheme: str) -> None
     p = 2 * np.pi * 2.0
 
     def build(builder: ModelBuilder) -> None:
-        unknowns, weights = along(builder.model, CONTACT_WIRE, PLANE)
+        unknowns, weights = forces_along(builder.model, CONTACT_WIRE, PLANE)
         nodes = builder.mesh.wires[CONTACT_WIRE]
         shape = LOAD * np.sin(np.pi * builder.mesh.x(nodes) / LENGTH)
         builder.add_load(ShapeLoad(unknowns, weights @ shape, harmonics([2.0], [1.0], [0.0])))
@@ -156,7 +156,7 @@ def test_a_travelling_field_drives_a_string_as_its_closed_form_says() -> None:
     def sampled(spacing: float, interval: float) -> Build:
         def build(builder: ModelBuilder) -> None:
             points = np.arange(0.0, LENGTH + 0.5 * spacing, spacing)
-            unknowns, weights = along(builder.model, CONTACT_WIRE, PLANE, points)
+            unknowns, weights = forces_along(builder.model, CONTACT_WIRE, PLANE, points)
 
             def fill(first: int, part: slice, slices: np.ndarray) -> None:
                 times = interval * (first + np.arange(slices.shape[0]))

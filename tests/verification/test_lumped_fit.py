@@ -10,7 +10,7 @@ from studies import few
 
 from catenary import InputError
 from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.response import BOUNDS, fit_chain, linearise, of_chain
+from catenary.mbs.response import BOUNDS, chain_model, fit_chain, linearise
 
 FREQUENCIES = np.geomspace(0.1, 25.0, 120)
 CHAINS = {
@@ -25,7 +25,7 @@ CHAINS = {
 def test_known_chains_come_back(name: str) -> None:
     """No chain but this one has this receptance: to 1e-6 of each value."""
     known = CHAINS[name]
-    fit = fit_chain(FREQUENCIES, of_chain(known).receptance(FREQUENCIES), known.n_masses)
+    fit = fit_chain(FREQUENCIES, chain_model(known).receptance(FREQUENCIES), known.n_masses)
     for what in ("masses", "stiffnesses", "dampings"):
         expected = np.array(getattr(known, what))
         check(what, getattr(fit.data, what), expected, within=1e-6 * expected)
@@ -61,10 +61,10 @@ def test_lift_that_grows_with_height_is_fitted_above_it_only() -> None:
     """
     falling = LumpedData((7.2, 15.0), (4200.0, -100.0), (10.0, 20.0))
     whole = np.geomspace(0.1, 25.0, 120)
-    fit = fit_chain(whole, of_chain(falling).receptance(whole), 2)
+    fit = fit_chain(whole, chain_model(falling).receptance(whole), 2)
     assert fit.largest_error > 1.0
     above = whole[whole >= 2.0]
-    fit = fit_chain(above, of_chain(falling).receptance(above), 2)
+    fit = fit_chain(above, chain_model(falling).receptance(above), 2)
     assert fit.largest_error < 0.04
     check("masses [kg]", fit.data.masses, (7.2, 15.0), within=(0.2, 0.6))
     assert fit.data.stiffnesses[1] < 2 * BOUNDS[1][0], "as little as it may be"
@@ -72,7 +72,7 @@ def test_lift_that_grows_with_height_is_fitted_above_it_only() -> None:
 
 
 def test_mistakes_are_told() -> None:
-    found = of_chain(CHAINS["one mass"]).receptance(FREQUENCIES)
+    found = chain_model(CHAINS["one mass"]).receptance(FREQUENCIES)
     for n_masses in (0, 4):
         with pytest.raises(InputError, match="1 to 3 masses"):
             fit_chain(FREQUENCIES, found, n_masses)

@@ -21,7 +21,7 @@ from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.response import LinearModel, apparent_mass, head_response, linearise, of_chain
+from catenary.mbs.response import LinearModel, apparent_mass, chain_model, head_response, linearise
 from catenary.mbs.rigid.bodies import SPACE, Body, point
 from catenary.mbs.rigid.forces import Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.implicit_steps import Stepper
@@ -36,7 +36,7 @@ OMEGA = 2 * np.pi * FREQUENCIES
 def test_one_mass_on_a_spring() -> None:
     """H = 1 / (k - m w^2 + i w c): round-off."""
     mass, stiffness, damping = 7.2, 4200.0, 30.0
-    model = of_chain(LumpedData((mass,), (stiffness,), (damping,)))
+    model = chain_model(LumpedData((mass,), (stiffness,), (damping,)))
     expected = 1.0 / (stiffness - mass * OMEGA**2 + 1j * OMEGA * damping)
     found = model.receptance(FREQUENCIES)
     check("H [m/N]", np.abs(found - expected), 0.0, within=1e-14 * np.abs(expected))
@@ -88,7 +88,7 @@ def test_bodies_on_guides_are_the_lumped_chain() -> None:
     """The same system twice: to the differences of forces, eps 300 N / 1e-5 m of 50 N/m."""
     system = two_masses()
     found = linearise(system, system.start(), "head").receptance(FREQUENCIES)
-    chain = of_chain(LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0)))
+    chain = chain_model(LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0)))
     expected = chain.receptance(FREQUENCIES)
     check("H [m/N]", np.abs(found - expected), 0.0, within=1e-7 * np.abs(expected))
 
@@ -99,7 +99,7 @@ def test_two_masses_in_closed_form() -> None:
     s1, s2 = k1 + 1j * OMEGA * c1, k2 + 1j * OMEGA * c2
     d1, d2 = -m1 * OMEGA**2, s2 - m2 * OMEGA**2
     expected = (d2 + s1) / (d1 * d2 + s1 * (d1 + d2))
-    found = of_chain(LumpedData((m1, m2), (k1, k2), (c1, c2))).receptance(FREQUENCIES)
+    found = chain_model(LumpedData((m1, m2), (k1, k2), (c1, c2))).receptance(FREQUENCIES)
     check("H [m/N]", np.abs(found - expected), 0.0, within=1e-13 * np.abs(expected))
 
 
@@ -108,7 +108,7 @@ def test_strips_on_springs_of_their_own_are_a_mass_more() -> None:
     strips = Strips(2, 0.4, suspension=Suspension(1.1, 5000.0, 20.0))
     data = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0), strips)
     chain = LumpedData((2.2, 5.0, 15.0), (1e4, 4200.0, 50.0), (40.0, 10.0, 90.0))
-    expected = of_chain(chain)
+    expected = chain_model(chain)
     found = head_response(data, 120.0).model
     check("H [m/N]", np.abs(found.receptance(FREQUENCIES) / expected.receptance(FREQUENCIES) - 1.0),
           0.0, within=1e-12)  # fmt: skip
@@ -304,4 +304,4 @@ def test_only_rest_is_linearised() -> None:
     with pytest.raises(InputError, match=r"not at rest .* 1\d\d? N are left"):
         linearise(system, at_rest(pressed(system)), HEAD)
     with pytest.raises(InputError, match="no response at one of the frequencies"):
-        of_chain(LumpedData((1.0,), (0.0,), (0.0,))).receptance([0.0])
+        chain_model(LumpedData((1.0,), (0.0,), (0.0,))).receptance([0.0])

@@ -23,7 +23,7 @@ from catenary.mbs.response import linearise
 from catenary.mbs.rigid.implicit_steps import METHODS
 from catenary.mbs.rigid.joints import PrescribedAngle
 from catenary.mbs.rigid.system import without_spins
-from catenary.mbs.vehicle import BaseMotion, Table, VehicleMotion
+from catenary.mbs.vehicle import BaseMotion, Spline, VehicleMotion
 
 STATIC, HEIGHT, DT = 150.0, 5.08, 1e-3
 WIRE = 5e4  # [N/m] contact, on a wire that does not give way
@@ -198,7 +198,7 @@ def test_vehicle_that_heaves_moves_it_as_the_reduced_one() -> None:
     0.2 % of frequency are 0.4 % / |1 - (2 / 2.3)^2| more, 2 %.
     """
     times = np.linspace(0.0, 6.0, 601)
-    heave = Table(tuple(times), tuple(0.01 * np.sin(4 * np.pi * times) * growing(times)))
+    heave = Spline(tuple(times), tuple(0.01 * np.sin(4 * np.pi * times) * growing(times)))
     vehicle = VehicleMotion(vertical=(heave,))
     bases = [BaseMotion(vehicle, 0.0, 80.0) for _ in range(2)]
     found = []

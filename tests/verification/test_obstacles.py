@@ -21,7 +21,7 @@ from catenary.meshgen.line import SteadyArm
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
 from catenary.solver.statics.line_at_rest import line_at_rest
-from catenary.solver.waves.reflection import answer, change_of_wire, scattered
+from catenary.solver.waves.reflection import answer_of, change_of_wire, scattered
 
 pytestmark = pytest.mark.study
 
@@ -71,7 +71,7 @@ def test_no_energy_is_lost_at_obstacles_with_bending() -> None:
     k = 1e5 * np.array([[1.0, -1.0], [-1.0, 1.0]])
     d = k - (OMEGA**2)[:, None, None] * np.diag([0.2, 0.3]) + 0j
     back, onward = scattered(pair, OMEGA, d)
-    flux = np.stack([-OMEGA / answer(one, OMEGA).wave.imag for one in pair])
+    flux = np.stack([-OMEGA / answer_of(one, OMEGA).wave.imag for one in pair])
     for i in (0, 1):
         out = np.einsum("jf,fj->f", flux, np.abs(back[:, :, i]) ** 2 + np.abs(onward[:, :, i]) ** 2)
         np.testing.assert_allclose(out / flux[i], 1.0, rtol=1e-12)

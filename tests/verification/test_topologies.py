@@ -18,8 +18,9 @@ from catenary.meshgen.topologies.line_data import ClampedWire, LineData, Overlap
 from catenary.meshgen.topologies.overlaps import of_next
 from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.model import beam
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.statics.elasticity import elasticity
-from catenary.solver.statics.form_finding import Equilibrium, find_form
+from catenary.solver.statics.form_finding import find_form
 
 GRAVITY = 9.81
 TWIN = Twin(0.06, False)

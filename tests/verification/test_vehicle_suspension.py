@@ -15,11 +15,11 @@ from catenary.mbs.vehicle import (
     BaseMotion,
     Irregularity,
     Sideways,
-    Table,
+    Spline,
     Vehicle,
     VehicleMotion,
-    matrices,
-    transfer,
+    equations_of,
+    roof_transfer,
 )
 
 # Of a coach, after the Manchester benchmarks (S. Iwnicki, Vehicle System Dynamics 30, 1998).
@@ -33,7 +33,7 @@ SPEED = 70.0
 
 
 def one(vehicle: Vehicle, direction: str, wave_number: float) -> complex:
-    return complex(transfer(vehicle, direction, np.array([wave_number]), SPEED)[0])
+    return complex(roof_transfer(vehicle, direction, np.array([wave_number]), SPEED)[0])
 
 
 @pytest.mark.parametrize("waves", [1, 2])
@@ -76,7 +76,7 @@ def test_long_waves_pass_and_short_ones_do_not() -> None:
 def test_sideways_the_body_rolls_about_its_springs() -> None:
     """A car that is pushed slowly by a steady side force leans outward by
     F h / (2 k b^2 - M g h) about its springs: static stiffness beside the closed form."""
-    found, side = matrices(ON_TRACK, "lateral"), ON_TRACK.sideways
+    found, side = equations_of(ON_TRACK, "lateral"), ON_TRACK.sideways
     assert found is not None and side is not None
     force = 1e4
     motion = np.linalg.solve(found.stiffness, [force, 0.0, 0.0])
@@ -94,9 +94,9 @@ def test_sideways_the_body_rolls_about_its_springs() -> None:
     check("roof [m]", found.roof @ motion, sway - side.roof_above * lean, within=1e-12)
 
 
-def in_time(vehicle: Vehicle, course: Table, places: np.ndarray) -> np.ndarray:
+def in_time(vehicle: Vehicle, course: Spline, places: np.ndarray) -> np.ndarray:
     """The roof at places by an integrator of another kind, from rest far before the course."""
-    found = matrices(vehicle, "vertical")
+    found = equations_of(vehicle, "vertical")
     assert found is not None
     n, inverse = len(found.mass), np.linalg.inv(found.mass)
     spline = BaseMotion(VehicleMotion((course,)), 0.0, 1.0)
@@ -136,7 +136,7 @@ def test_a_course_of_the_track_is_followed_in_time(vehicle: Vehicle) -> None:
     2e-4 1/m times 0.1^2 / 8 is 3e-7 m, and a spline through the roof's places does as well."""
     points = tuple(float(x) for x in np.linspace(0.0, 300.0, 61))
     values = tuple(0.02 * math.exp(-(((x - 100.0) / 15.0) ** 2)) for x in points)
-    course = Table(points, values, along_track=True)
+    course = Spline(points, values, along_track=True)
     motion = BaseMotion(VehicleMotion((course,), suspension=vehicle), 0.0, SPEED)
     places = np.linspace(50.0, 290.0, 200)
     found = np.array([motion.vertical(place / SPEED).place for place in places])
@@ -152,7 +152,7 @@ def test_a_random_track_reaches_the_roof_by_the_transfer_function() -> None:
     still = VehicleMotion((track,))
     on_springs = replace(still, suspension=ON_BOGIES)
     amplitudes, wave_numbers, phases = track.waves("vertical")
-    passed = transfer(ON_BOGIES, "vertical", wave_numbers, SPEED)
+    passed = roof_transfer(ON_BOGIES, "vertical", wave_numbers, SPEED)
     for start, time in ((0.0, 1.3), (-200.0, 2.7)):
         place = start + SPEED * time
         waves = amplitudes * passed * np.exp(1j * (wave_numbers * place + phases))
@@ -169,7 +169,7 @@ def test_a_random_track_reaches_the_roof_by_the_transfer_function() -> None:
 def test_without_data_sideways_the_roof_follows_the_track_there() -> None:
     """A table follows its spline, through points 0.1 m apart."""
     upward_only = replace(ON_TRACK, sideways=None)
-    bend = Table((0.0, 40.0, 80.0, 200.0), (0.0, 0.01, -0.02, 0.0), along_track=True)
+    bend = Spline((0.0, 40.0, 80.0, 200.0), (0.0, 0.01, -0.02, 0.0), along_track=True)
     for track in (Irregularity("german_low", 3.0, 100.0, seed=3), bend):
         rigid = VehicleMotion((), (track,))
         expected, found = (

@@ -26,13 +26,12 @@ from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.meshgen.wires import End, Piece, Role, Wire
+from catenary.meshgen.wires import SAME_PLACE, End, Piece, Role, Wire
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.effects.effect import Limit
 
 # More waves than these along a line take more memory than its motion.
 MOST_WAVES = 400_000
-_TINY = 1e-6  # [m]
 
 
 def check_defects(scene: Scene, data: LineData) -> Iterator[Fault]:
@@ -76,14 +75,14 @@ def _irregularities(scene: Scene, line: Line) -> Iterator[Fault]:
             continue
         key, length = f"irregularities.{name}", line.support_positions[-1]
         for i, (x, _) in enumerate(table.by_place or []):
-            if not -_TINY <= x <= length + _TINY:
+            if not -SAME_PLACE <= x <= length + SAME_PLACE:
                 why = f"the line runs from 0 to {length:g} m"
                 yield scene.refused(f"{key}.by_place.{i}.0", why)
         if table.standard_deviation_mm is None:
             continue
         start, end = stretch_of(table, line)
         for part, value in (("from_m", table.from_m), ("to_m", table.to_m)):
-            if value is not None and value > length + _TINY:
+            if value is not None and value > length + SAME_PLACE:
                 yield scene.refused(f"{key}.{part}", f"the line ends at {length:g} m")
         if end <= start and table.to_m is not None:
             why = f"it must be greater than the {start:g} m where they begin"
@@ -121,7 +120,7 @@ def _place(scene: Scene, wire: Wire, key: str, x: float) -> Iterator[Fault]:
         return
     ends = [place for piece in wire.pieces for place in _held_ends(piece)]
     periodic = "periodic" in (scene.line.ends.start.kind, scene.line.ends.end.kind)
-    if not periodic and any(abs(place - x) < _TINY for place in ends):
+    if not periodic and any(abs(place - x) < SAME_PLACE for place in ends):
         yield scene.refused(key, f"{wire.name} ends there, where it is held and nothing moves it")
 
 
@@ -132,7 +131,7 @@ def _held_ends(piece: Piece) -> list[float]:
 
 
 def _is_at(wire: Wire, x: float) -> bool:
-    return any(piece.x[0] - _TINY <= x <= piece.x[-1] + _TINY for piece in wire.pieces)
+    return any(piece.x[0] - SAME_PLACE <= x <= piece.x[-1] + SAME_PLACE for piece in wire.pieces)
 
 
 def dropper_faults(

@@ -26,8 +26,8 @@ from catenary.cases.scene.line.wires import (
     FreeWireTable,
 )
 from catenary.cases.scene.scene import Scene
-from catenary.meshgen.geometry import SAME_CUT, Cuts, divisions_of
-from catenary.meshgen.line import Clamps
+from catenary.meshgen.geometry import Cuts, divisions_of
+from catenary.meshgen.line import Clamps, mast_places
 from catenary.meshgen.mesh import ANCHORS
 from catenary.meshgen.topologies.free import carriers, hung, in_order
 from catenary.meshgen.topologies.line_data import (
@@ -37,6 +37,7 @@ from catenary.meshgen.topologies.line_data import (
     FreeWire,
     LineData,
 )
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.postproc.evaluate.wording import counted
 
 # Names that mean something else in files and among ends.
@@ -48,8 +49,7 @@ _ELSEWHERE = {
     "overlap": "give the wires of both sections stretches_m in line.wires",
 }
 # As many as spans of 20 droppers each on the longest line.
-MOST_DROPPERS = 400_000
-_TINY = 1e-6  # [m]
+MOST_BY_LINKS = 400_000
 
 
 def check_free_tables(scene: Scene) -> Iterator[Fault]:
@@ -101,7 +101,7 @@ def _names(scene: Scene) -> Iterator[Fault]:
 def _wire(
     scene: Scene, key: str, table: FreeWireTable, wires: dict[str, FreeWireTable]
 ) -> Iterator[Fault]:
-    masts = np.concatenate([[0.0], np.cumsum(span_lengths(scene.line))])
+    masts = mast_places(span_lengths(scene.line))
     n, length = scene.line.n_spans, float(masts[-1])
     for name in ("height_m", "stagger_m"):
         given = getattr(table, name)
@@ -118,13 +118,13 @@ def _wire(
     if not stretches:
         yield scene.refused(f"{key}.{which}", "the line has no inner support")
         return
-    if stretches[0][0] < -_TINY or stretches[-1][1] > length + _TINY:
-        outside = stretches[0] if stretches[0][0] < -_TINY else stretches[-1]
+    if stretches[0][0] < -SAME_PLACE or stretches[-1][1] > length + SAME_PLACE:
+        outside = stretches[0] if stretches[0][0] < -SAME_PLACE else stretches[-1]
         why = f"a piece would run from {outside[0]:g} to {outside[1]:g} m, and the line from 0 to"
         yield scene.refused(f"{key}.{which}", f"{why} {length:g} m")
         return
     for one, other in zip(stretches, stretches[1:], strict=False):
-        if other[0] < one[1] + _TINY:
+        if other[0] < one[1] + SAME_PLACE:
             why = f"pieces would overlap from {other[0]:g} to {one[1]:g} m"
             yield scene.refused(f"{key}.{which}", why)
             return
@@ -239,12 +239,12 @@ def _many(scene: Scene) -> Iterator[Fault]:
             patterns = [len(pattern.positions_m) for pattern in link.patterns or []]
             each = max([len(link.positions_m or []), link.count or 0, *patterns])
             n += len(link.at_m) if link.at_m is not None else spans * each
-            if n > MOST_DROPPERS:
+            if n > MOST_BY_LINKS:
                 key = f"line.links.{i}"
                 yield Fault(
                     key,
                     f"{key} ({link.name}) {scene.origin.of(key)} and the links before it have {n} "
-                    f"droppers, but at most {MOST_DROPPERS} are allowed",
+                    f"droppers, but at most {MOST_BY_LINKS} are allowed",
                 )
                 return
 
@@ -349,7 +349,7 @@ def places_of(line: LineData) -> np.ndarray:
     parts += [np.array(_places(link)) for link in line.links]
     x = np.concatenate(parts)
     x = x[np.argsort(x, kind="stable")]
-    return x[np.diff(x, prepend=-np.inf) > SAME_CUT]
+    return x[np.diff(x, prepend=-np.inf) > SAME_PLACE]
 
 
 def free_counts(scene: Scene) -> tuple[int, dict[str, int]]:
@@ -440,7 +440,7 @@ def _carried(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator
     """Wires that no link carries over much more than the longest span."""
     at, longest = carriers(line, wire), max(line.span_lengths)
     for start, end in wire.stretches:
-        own = at[(at > start - _TINY) & (at < end + _TINY)]
+        own = at[(at > start - SAME_PLACE) & (at < end + SAME_PLACE)]
         gap = np.diff(own)
         far = np.flatnonzero(gap > MOST_SPANS * longest)
         if far.size:

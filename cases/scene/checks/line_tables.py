@@ -29,11 +29,21 @@ from catenary.cases.scene.scene import Scene
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import FREE, make_line, registered
 from catenary.meshgen.topologies.line_data import SHORTEST_GAP, FreeDroppers, LineData
-from catenary.meshgen.wires import End, Wire
+from catenary.meshgen.wires import SAME_PLACE, End, Wire
 from catenary.solver.problem.ends import AlongTrack
+from catenary.solver.problem.problem import Problem
 
 # Keys of ``line`` that come with a part of a topology.
 _WITH = {"messenger_wire": ("encumbrance_m",)}
+_SIDES = ("start", "end")
+_ACROSS, _ALONG = "lateral_motion", "axial_motion"
+# A place is at a mast if it is nearer than this [m].
+_AT_MAST = 1e-3
+_ARM = "line.steady_arm"
+# Weights fit a tension if they differ by a smaller share.
+_FITS = 1e-6
+# The last span and the one that is repeated.
+_LAST = 2
 
 
 def check_topology(scene: Scene) -> Iterator[Fault]:
@@ -94,7 +104,7 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     if line.n_spans < 2:
         yield scene.refused("line.n_spans", "a stitched line needs a support, that is two spans")
         return
-    yield from _length(scene, line, key, stitch.length)
+    yield from _too_long(scene, line, key, stitch.length)
     clamps = line.around_supports(stitch.length).ravel()
     apart = _to_nearest(clamps, line.dropper_x)
     if apart.min() < SHORTEST_GAP:
@@ -104,7 +114,7 @@ def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
     if nearest > 0.5 * stitch.length:
         why = f"no dropper would hang from it: the nearest one is {nearest:g} m from a support"
         yield scene.refused(key, why)
-    yield from _tension(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
+    yield from _takes_all(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
 
 
 def _to_nearest(x: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -115,18 +125,20 @@ def _to_nearest(x: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 def _bridle(scene: Scene, line: LineData) -> Iterator[Fault]:
     if line.bridle is not None:
-        yield from _length(scene, line, "line.bridle.length_m", line.bridle.length)
+        yield from _too_long(scene, line, "line.bridle.length_m", line.bridle.length)
         tensions = line.bridle.conductor.tension, line.contact_wire.tension
-        yield from _tension(scene, "bridle", tensions[0], "contact_wire", tensions[1])
+        yield from _takes_all(scene, "bridle", tensions[0], "contact_wire", tensions[1])
 
 
-def _length(scene: Scene, line: LineData, key: str, length: float) -> Iterator[Fault]:
+def _too_long(scene: Scene, line: LineData, key: str, length: float) -> Iterator[Fault]:
     shortest = min(line.span_lengths)
     if length >= shortest:
         yield scene.refused(key, f"it must be less than the shortest span ({shortest:g} m)")
 
 
-def _tension(scene: Scene, wire: str, tension: float, bearer: str, whole: float) -> Iterator[Fault]:
+def _takes_all(
+    scene: Scene, wire: str, tension: float, bearer: str, whole: float
+) -> Iterator[Fault]:
     """A wire between clamps that would take all tension of the one that it is clamped to."""
     if tension >= whole:
         yield scene.refused(
@@ -214,9 +226,6 @@ def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
         return
 
 
-_ACROSS = "lateral_motion"
-
-
 def check_lateral(scene: Scene) -> Iterator[Fault]:
     """Keys of lateral motion without it."""
     line = scene.line
@@ -235,16 +244,6 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
             yield scene.needs_effect(key, _ACROSS)
 
 
-_ALONG = "axial_motion"
-_GRAVITY = 9.81
-# A place is at a mast if it is nearer than this [m].
-_AT_MAST = 1e-3
-_SIDES = ("start", "end")
-_ARM = "line.steady_arm"
-# Weights fit a tension if they differ by a smaller share.
-_FITS = 1e-6
-
-
 def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Data that motion along the track lacks, and data that only it has a use for."""
     on = scene.switches()[_ALONG]
@@ -256,11 +255,11 @@ def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
     if not scene.origin.recorded:
         yield from _idle_tensioners(scene)
     if on:
-        yield from _wires(scene)
-        yield from _arms(scene, line)
-        yield from _held(scene, line)
-        yield from _held_free(scene, line)
-        yield from _elsewhere(scene)
+        yield from _without_stiffness(scene)
+        yield from _without_length(scene, line)
+        yield from _loose_sections(scene, line)
+        yield from _loose_wires(scene, line)
+        yield from _excluded(scene)
 
 
 def _data_of_effect(scene: Scene) -> list[str]:
@@ -269,8 +268,7 @@ def _data_of_effect(scene: Scene) -> list[str]:
     found, overlap = [], table.overlap
     if overlap and "along" in overlap.model_fields_set and not recorded:
         found.append("line.overlap.along")
-    ends = (("start", table.ends.start), ("end", table.ends.end))
-    found += [f"line.ends.{side}.along" for side, end in ends if end.along == TENSIONER]
+    found += [f"line.ends.{side}.along" for side, end in table.ends if end.along == TENSIONER]
     found += ["line.temperature.difference_K"] if table.temperature.difference_K else []
     found += ["line.mid_points_m"] if table.mid_points_m else []
     if not recorded:
@@ -294,7 +292,7 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
     given = table.tensioner.model_fields_set
     if not given or scene.effects.get("tensioners") is False:
         return
-    ends = [table.ends.start.along, table.ends.end.along]
+    ends = [end.along for _, end in table.ends]
     ends += [] if table.overlap is None else [table.overlap.along]
     if TENSIONER not in ends and not _ends_of_free_wires(table):
         yield scene.fault(
@@ -308,7 +306,7 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
         yield scene.refused("line.tensioner.stop_stiffness_N_per_m", why)
 
 
-def _wires(scene: Scene) -> Iterator[Fault]:
+def _without_stiffness(scene: Scene) -> Iterator[Fault]:
     for key, wire in wire_tables(scene.line).items():
         if wire.stiffness_along() is None:
             field = LineTable.model_fields.get(key.removeprefix("line."))
@@ -320,7 +318,7 @@ def _wires(scene: Scene) -> Iterator[Fault]:
             )
 
 
-def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
+def _without_length(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Arms without a length, along which nothing could swing."""
     made = make_line(line)
     keys = {getattr(table, "name", ""): key for key, table in arm_tables(scene.line).items()}
@@ -334,7 +332,7 @@ def _arms(scene: Scene, line: LineData) -> Iterator[Fault]:
             return
 
 
-def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
+def _loose_sections(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Sections with a tensioner at both ends and nothing in between that holds their wires."""
     along, masts, overlaps = along_of(scene.line), line.support_positions, line.overlaps
     sections = [[0.0, float(masts[-1])]]
@@ -353,7 +351,7 @@ def _held(scene: Scene, line: LineData) -> Iterator[Fault]:
             )
 
 
-def _held_free(scene: Scene, line: LineData) -> Iterator[Fault]:
+def _loose_wires(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Free wires with tensioners of their own at both ends and nothing in between."""
     along = along_of(scene.line)
     of_line = {"start": along.start, "end": along.end}
@@ -408,9 +406,9 @@ def _weights(scene: Scene, line: LineData) -> Iterator[Fault]:
             yield scene.refused(key, why + take_away())
             continue
         tension = wires[name].tension
-        low, high = tensioner.band(name, wires[name], _GRAVITY)
+        low, high = tensioner.band(name, wires[name], Problem.gravity)
         if not low * (1 - _FITS) <= tension <= high * (1 + _FITS):
-            fits = tension / (tensioner.ratio * _GRAVITY)
+            fits = tension / (tensioner.ratio * Problem.gravity)
             holds = f"{low:g} N" if low == high else f"{low:g} to {high:g} N"
             yield scene.refused(
                 key,
@@ -429,9 +427,9 @@ def _has_tensioner(wire: Wire, along: AlongTrack, line: LineData) -> bool:
     )
 
 
-def _elsewhere(scene: Scene) -> Iterator[Fault]:
+def _excluded(scene: Scene) -> Iterator[Fault]:
     """Ends and windows that exclude motion along the track."""
-    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+    for side, end in scene.line.ends:
         if end.kind == "periodic":
             yield scene.refused(
                 f"line.ends.{side}.kind",
@@ -446,16 +444,10 @@ def _elsewhere(scene: Scene) -> Iterator[Fault]:
         )
 
 
-# Lengths of spans that differ by less are one [m].
-_TINY = 1e-6
-# The last span and the one that is repeated.
-_LAST = 2
-
-
 def check_ends(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Ends that cannot be."""
     yield from _layers(scene, line)
-    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+    for side, end in scene.line.ends:
         if end.kind == "periodic":
             yield from _goes_on(scene, line, side)
 
@@ -484,7 +476,7 @@ def _goes_on(scene: Scene, line: LineData, side: str) -> Iterator[Fault]:
         yield refused(f"it needs {_LAST + 1} spans (line.n_spans) at least, not {n}")
         return
     lengths = line.span_lengths[:_LAST] if side == "start" else line.span_lengths[-_LAST:]
-    if abs(lengths[0] - lengths[1]) > _TINY:
+    if abs(lengths[0] - lengths[1]) > SAME_PLACE:
         yield refused(
             f"the two spans there must have one length (line.span_m), not {lengths[0]:g} and "
             f"{lengths[1]:g} m"
@@ -508,7 +500,7 @@ def _layers(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Layers that are longer than the line, or reach into what is judged."""
     masts, n = line.support_positions, line.n_spans
     stretch = scene.evaluation
-    for side, end in (("start", scene.line.ends.start), ("end", scene.line.ends.end)):
+    for side, end in scene.line.ends:
         if end.spans is None:
             continue
         key = f"line.ends.{side}.spans"

@@ -1,6 +1,7 @@
-"""Whether pantographs can be what a scene says, and fit the vehicle's motion, the air and the line.
+"""Whether pantographs can be what a scene says, and fit the vehicle's motion, the line and the air.
 
-Of the air these are wind, uplift and tunnels, which must find what they need.
+Mechanisms must reach the wire, and strips be long enough for it; wind, tunnels and uplift must find
+what they act on.
 """
 
 from __future__ import annotations
@@ -29,196 +30,18 @@ from catenary.cases.scene.train.pantograph import (
 )
 from catenary.cases.scene.train.train import MotionTable, vehicle_of
 from catenary.mbs.rigid.bodies import SPACE
+from catenary.mbs.vehicle import BaseMotion
 from catenary.meshgen.topologies.line_data import LineData
 
 if TYPE_CHECKING:
-    from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
+    from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, Standing
 
 # A wave of an irregular track takes at least so many steps.
 STEPS_PER_WAVE = 8
-# Slack for sums of decimal lengths [m] and times [s].
-_TINY = 1e-6
-
-
-def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Contradictions between vehicle, heads and line."""
-    yield from _vehicle_acts(scene)
-    yield from _roll_acts(scene)
-    yield from _multibody_strips(scene)
-    reaches = list(_tables_reach(scene))
-    yield from reaches
-    yield from _waves(scene)
-    if not reaches:
-        yield from _strip_lengths(scene, line)
-
-
-def _kinds(scene: Scene) -> dict[str, PantographTable]:
-    """Tables of the kinds of pantograph that are on the train, by their names, leading one first.
-
-    Names have no fault.
-    """
-    return {place.name: scene.pantographs[place.name] for place in scene.train.pantographs}
-
-
-def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
-    on, is_given = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
-    if scene.vehicle is None:
-        return
-    if not on and not is_given:
-        yield _idle(scene, "vehicle", "vehicle_motion")
-    if on and not _wire_moves_along_strips(scene):
-        suspension = scene.vehicle.suspension
-        sways = suspension is not None and suspension.lateral is not None
-        for key, is_there in (
-            ("vehicle.lateral", scene.vehicle.lateral is not None),
-            ("vehicle.suspension.lateral", sways and scene.switches()["vehicle_suspension"]),
-        ):
-            if is_there:
-                yield scene.fault(
-                    key,
-                    "moves the wire along the strips, which acts only with effects.head_roll = "
-                    "true, effects.lateral_motion = true or strips that bend",
-                )
-
-
-def _wire_moves_along_strips(scene: Scene) -> bool:
-    """Whether it matters where wires cross the strips."""
-    on = scene.switches()
-    kinds = _kinds(scene).values()
-    bends = on["flexible_strips"] and any(kind.strips.flexure is not None for kind in kinds)
-    return bends or on["head_roll"] or on["lateral_motion"]
-
-
-def _roll_acts(scene: Scene) -> Iterator[Fault]:
-    on, is_given = scene.switches()["head_roll"], "head_roll" in scene.effects
-    for name, kind in _kinds(scene).items():
-        if not on and isinstance(kind, LumpedTable) and kind.roll is not None and not is_given:
-            yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
-        rolls = on and pantograph_of(name, kind, scene.train.speed_km_h).roll
-        if rolls and kind.strips.length_m is None:
-            strip = f"pantographs.{name}.strips.length_m"
-            why = f"it needs {strip}, the strip that the wire moves along"
-            yield scene.refused("effects.head_roll", why)
-
-
-def _idle(scene: Scene, key: str, effect: str) -> Fault:
-    return scene.fault(
-        key, f"acts only with effects.{effect} = true; write that, or false to leave it out"
-    )
-
-
-def _multibody_strips(scene: Scene) -> Iterator[Fault]:
-    for name, kind in _kinds(scene).items():
-        if not isinstance(kind, MultibodyTable) or kind.strips.mass_kg is None:
-            continue
-        from catenary.mbs.mechanism.multibody_pantograph import stand
-
-        data = pantograph_of(name, kind, scene.train.speed_km_h)
-        mass = stand(data).head.mass  # type: ignore[arg-type]
-        if kind.strips.mass >= mass:
-            yield scene.refused(
-                f"pantographs.{name}.strips.mass_kg",
-                f"strips are part of the head, which weighs {mass:.3g} kg",
-            )
-
-
-def _tables_reach(scene: Scene) -> Iterator[Fault]:
-    """Tables must hold for all of the run; splines are not continued."""
-    if scene.vehicle is None:
-        return
-    start, end = scene.train.start_m, end_of(scene)
-    rear = scene.train.pantographs[-1].behind_m
-    duration = (end - start) / (scene.train.speed_km_h / 3.6)
-    for direction in ("vertical", "lateral"):
-        table: MotionTable | None = getattr(scene.vehicle, direction)
-        if table is None:
-            continue
-        for name, pairs, low, high, unit in (
-            ("by_time", table.by_time, 0.0, duration, "s"),
-            ("by_place", table.by_place, start - rear, end, "m"),
-        ):
-            if pairs is None:
-                continue
-            first, last = pairs[0][0], pairs[-1][0]
-            if first > low + _TINY or last < high - _TINY:
-                yield scene.fault(
-                    f"vehicle.{direction}.{name}",
-                    f"holds from {first:g} to {last:g} {unit}, but the run needs it from {low:g} "
-                    f"to {high:.5g} {unit}",
-                )
-
-
-def _waves(scene: Scene) -> Iterator[Fault]:
-    if scene.vehicle is None or scene.vehicle.irregularity is None:
-        return
-    step = scene.train.speed_km_h / 3.6 * scene.numerics.dt_s
-    shortest = scene.vehicle.irregularity.shortest_m
-    if shortest < STEPS_PER_WAVE * step:
-        yield scene.refused(
-            "vehicle.irregularity.shortest_m",
-            f"the train runs {step:.3g} m in a step of numerics.dt_s; a wave must take "
-            f"{STEPS_PER_WAVE} of these",
-        )
-
-
-def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
-    for i, place in enumerate(scene.train.pantographs):
-        kind = scene.pantographs[place.name]
-        length = kind.strips.length_m
-        if length is None:
-            continue
-        far, x = _farthest(scene, line, i)
-        if 2.0 * abs(far) > length + _TINY:
-            keys = "line.stagger_m"
-            if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
-                keys += " and vehicle"
-            needed = math.ceil(2e3 * abs(far) - 1e-6) / 1e3
-            yield scene.refused(
-                f"pantographs.{place.name}.strips.length_m",
-                f"at {x:.4g} m the wire is {abs(far):.3g} m beside the strips' middle ({keys}), so "
-                f"that they must be at least {needed:g} m long",
-            )
-
-
-def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
-    """Farthest place of the wire from the middle of a pantograph's strips on its run, and the
-    pantograph's place then [m]."""
-    place, speed = scene.train.pantographs[number], scene.train.speed_km_h / 3.6
-    start = scene.train.start_m - place.behind_m
-    duration = (end_of(scene) - scene.train.start_m) / speed
-    offsets = np.array([1.0, -1.0]) * strips_ahead(scene)[number]
-    base = None
-    if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
-        from catenary.mbs.vehicle import BaseMotion
-
-        vehicle = vehicle_of(scene.vehicle)
-        if not scene.switches()["vehicle_suspension"]:
-            vehicle = replace(vehicle, suspension=None)
-        base = BaseMotion(vehicle, start, speed)
-    # Extremes are at supports, unless the vehicle sways: then every 0.25 m and 20 ms are sampled.
-    supports = line.support_positions
-    times = np.concatenate(
-        [[0.0, duration], *((supports - start - one) / speed for one in offsets)]
-    )
-    if base is not None:
-        n = math.ceil(duration / min(0.25 / speed, 0.02))
-        times = np.concatenate([times, np.linspace(0.0, duration, n)])
-    times = times[(times >= 0.0) & (times <= duration)]
-    ahead = start + speed * times[:, None] + offsets
-    courses = np.array(line.contact_sideways(ahead))
-    places = np.take_along_axis(courses, np.abs(courses).argmax(axis=0)[None], axis=0)[0]
-    if base is not None:
-        places -= np.array([base.lateral(time).place for time in times.tolist()])[:, None]
-    farthest = np.abs(places).max(axis=1)
-    first = int(np.argmax(farthest))
-    if farthest[first] == 0.0:
-        return 0.0, start
-    strip = int(np.argmax(np.abs(places[first])))
-    return float(places[first, strip]), float(start + speed * times[first])
-
-
 # By how much the arm may be further down than the head while both fall [m].
 _LEADS = 0.05
+# Slack for sums of decimal lengths [m] and times [s].
+_TINY = 1e-6
 
 
 def check_pantographs(scene: Scene) -> Iterator[Fault]:
@@ -243,18 +66,26 @@ def check_mechanisms(scene: Scene, line: LineData) -> Iterator[Fault]:
                 _standing(scene, name, table)
             except (InputError, RunBroken) as error:
                 found.append(scene.fault(f"pantographs.{name}", f"cannot be built: {error}"))
-    yield from found or _heights(scene, line)
+    yield from found or _out_of_reach(scene, line)
 
 
-def _heights(scene: Scene, line: LineData) -> Iterator[Fault]:
+def _kinds(scene: Scene) -> dict[str, PantographTable]:
+    """Tables of the kinds of pantograph that are on the train, by their names, leading one first.
+
+    Names have no fault.
+    """
+    return {place.name: scene.pantographs[place.name] for place in scene.train.pantographs}
+
+
+def _out_of_reach(scene: Scene, line: LineData) -> Iterator[Fault]:
     lowest = line.lowest_contact
     heights = lowest, line.contact_height
     for name, table in _kinds(scene).items():
         if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
             continue
-        data, working = _standing(scene, name, table)
+        data, standing = _standing(scene, name, table)
         for height in heights:
-            if _reaches(data, working + height - table.nominal_height_m):
+            if _reaches(data, standing.working_height + height - table.nominal_height_m):
                 continue
             yield scene.refused(
                 f"pantographs.{name}.nominal_height_m",
@@ -272,17 +103,17 @@ def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
         return True
     lowest = line.lowest_contact
     nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
-    data, working = _standing(scene, name, table)
-    return _reaches(data, working + lowest - nominal - drop - _LEADS)
+    data, standing = _standing(scene, name, table)
+    return _reaches(data, standing.working_height + lowest - nominal - drop - _LEADS)
 
 
-def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, float]:
-    """A mechanism and the height of its arm above its base where it stands [m]."""
+def _standing(scene: Scene, name: str, table: MultibodyTable) -> tuple[MultibodyData, Standing]:
+    """A mechanism, and how it stands."""
     from catenary.cases.scene.train.multibody import multibody_of
     from catenary.mbs.mechanism.multibody_pantograph import stand
 
     data = multibody_of(name, table, scene.train.speed_km_h)
-    return data, stand(data).working_height
+    return data, stand(data)
 
 
 def _reaches(data: MultibodyData, arm: float) -> bool:
@@ -389,6 +220,176 @@ def check_laws(scene: Scene) -> Iterator[Fault]:
             )
 
 
+def has_front(table: PantographTable) -> bool:
+    """Whether a pantograph that runs the other way round is another one."""
+    turned = table.aerodynamics is not None and table.aerodynamics.reversed is not None
+    return turned or table.type == "multibody"
+
+
+def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
+    """Contradictions between vehicle, heads and line."""
+    yield from _vehicle_acts(scene)
+    yield from _roll_acts(scene)
+    yield from _multibody_strips(scene)
+    reaches = list(_tables_reach(scene))
+    yield from reaches
+    yield from _waves(scene)
+    if not reaches:
+        yield from _strip_lengths(scene, line)
+
+
+def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
+    on, is_given = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
+    if scene.vehicle is None:
+        return
+    if not on and not is_given:
+        yield _idle(scene, "vehicle", "vehicle_motion")
+    if on and not _wire_moves_along_strips(scene):
+        suspension = scene.vehicle.suspension
+        sways = suspension is not None and suspension.lateral is not None
+        for key, is_there in (
+            ("vehicle.lateral", scene.vehicle.lateral is not None),
+            ("vehicle.suspension.lateral", sways and scene.switches()["vehicle_suspension"]),
+        ):
+            if is_there:
+                yield scene.fault(
+                    key,
+                    "moves the wire along the strips, which acts only with effects.head_roll = "
+                    "true, effects.lateral_motion = true or strips that bend",
+                )
+
+
+def _wire_moves_along_strips(scene: Scene) -> bool:
+    """Whether it matters where wires cross the strips."""
+    on = scene.switches()
+    kinds = _kinds(scene).values()
+    bends = on["flexible_strips"] and any(kind.strips.flexure is not None for kind in kinds)
+    return bends or on["head_roll"] or on["lateral_motion"]
+
+
+def _roll_acts(scene: Scene) -> Iterator[Fault]:
+    on, is_given = scene.switches()["head_roll"], "head_roll" in scene.effects
+    for name, kind in _kinds(scene).items():
+        if not on and isinstance(kind, LumpedTable) and kind.roll is not None and not is_given:
+            yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
+        rolls = on and pantograph_of(name, kind, scene.train.speed_km_h).roll
+        if rolls and kind.strips.length_m is None:
+            strip = f"pantographs.{name}.strips.length_m"
+            why = f"it needs {strip}, the strip that the wire moves along"
+            yield scene.refused("effects.head_roll", why)
+
+
+def _idle(scene: Scene, key: str, effect: str) -> Fault:
+    return scene.fault(
+        key, f"acts only with effects.{effect} = true; write that, or false to leave it out"
+    )
+
+
+def _multibody_strips(scene: Scene) -> Iterator[Fault]:
+    for name, kind in _kinds(scene).items():
+        if not isinstance(kind, MultibodyTable) or kind.strips.mass_kg is None:
+            continue
+        mass = _standing(scene, name, kind)[1].head.mass
+        if kind.strips.mass >= mass:
+            yield scene.refused(
+                f"pantographs.{name}.strips.mass_kg",
+                f"strips are part of the head, which weighs {mass:.3g} kg",
+            )
+
+
+def _tables_reach(scene: Scene) -> Iterator[Fault]:
+    """Tables must hold for all of the run; splines are not continued."""
+    if scene.vehicle is None:
+        return
+    start, end = scene.train.start_m, end_of(scene)
+    rear = scene.train.pantographs[-1].behind_m
+    duration = (end - start) / speed_from_km_h(scene.train.speed_km_h)
+    for direction in ("vertical", "lateral"):
+        table: MotionTable | None = getattr(scene.vehicle, direction)
+        if table is None:
+            continue
+        for name, pairs, low, high, unit in (
+            ("by_time", table.by_time, 0.0, duration, "s"),
+            ("by_place", table.by_place, start - rear, end, "m"),
+        ):
+            if pairs is None:
+                continue
+            first, last = pairs[0][0], pairs[-1][0]
+            if first > low + _TINY or last < high - _TINY:
+                yield scene.fault(
+                    f"vehicle.{direction}.{name}",
+                    f"holds from {first:g} to {last:g} {unit}, but the run needs it from {low:g} "
+                    f"to {high:.5g} {unit}",
+                )
+
+
+def _waves(scene: Scene) -> Iterator[Fault]:
+    if scene.vehicle is None or scene.vehicle.irregularity is None:
+        return
+    step = speed_from_km_h(scene.train.speed_km_h) * scene.numerics.dt_s
+    shortest = scene.vehicle.irregularity.shortest_m
+    if shortest < STEPS_PER_WAVE * step:
+        yield scene.refused(
+            "vehicle.irregularity.shortest_m",
+            f"the train runs {step:.3g} m in a step of numerics.dt_s; a wave must take "
+            f"{STEPS_PER_WAVE} of these",
+        )
+
+
+def _strip_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
+    for i, place in enumerate(scene.train.pantographs):
+        kind = scene.pantographs[place.name]
+        length = kind.strips.length_m
+        if length is None:
+            continue
+        far, x = _farthest(scene, line, i)
+        if 2.0 * abs(far) > length + _TINY:
+            keys = "line.stagger_m"
+            if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
+                keys += " and vehicle"
+            needed = math.ceil(2e3 * abs(far) - 1e-6) / 1e3
+            yield scene.refused(
+                f"pantographs.{place.name}.strips.length_m",
+                f"at {x:.4g} m the wire is {abs(far):.3g} m beside the strips' middle ({keys}), so "
+                f"that they must be at least {needed:g} m long",
+            )
+
+
+def _farthest(scene: Scene, line: LineData, number: int) -> tuple[float, float]:
+    """Farthest place of the wire from the middle of a pantograph's strips on its run, and the
+    pantograph's place then [m]."""
+    place, speed = scene.train.pantographs[number], speed_from_km_h(scene.train.speed_km_h)
+    start = scene.train.start_m - place.behind_m
+    duration = (end_of(scene) - scene.train.start_m) / speed
+    offsets = np.array([1.0, -1.0]) * strips_ahead(scene)[number]
+    base = None
+    if scene.switches()["vehicle_motion"] and scene.vehicle is not None:
+        vehicle = vehicle_of(scene.vehicle)
+        if not scene.switches()["vehicle_suspension"]:
+            vehicle = replace(vehicle, suspension=None)
+        base = BaseMotion(vehicle, start, speed)
+    # Extremes are at supports, unless the vehicle sways: then every 0.25 m and 20 ms are sampled.
+    supports = line.support_positions
+    times = np.concatenate(
+        [[0.0, duration], *((supports - start - one) / speed for one in offsets)]
+    )
+    if base is not None:
+        n = math.ceil(duration / min(0.25 / speed, 0.02))
+        times = np.concatenate([times, np.linspace(0.0, duration, n)])
+    times = times[(times >= 0.0) & (times <= duration)]
+    ahead = start + speed * times[:, None] + offsets
+    courses = np.array(line.contact_sideways(ahead))
+    places = np.take_along_axis(courses, np.abs(courses).argmax(axis=0)[None], axis=0)[0]
+    if base is not None:
+        places -= np.array([base.lateral(time).place for time in times.tolist()])[:, None]
+    farthest = np.abs(places).max(axis=1)
+    first = int(np.argmax(farthest))
+    if farthest[first] == 0.0:
+        return 0.0, start
+    strip = int(np.argmax(np.abs(places[first])))
+    return float(places[first, strip]), float(start + speed * times[first])
+
+
 def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Wires without a diameter, stretches that overlap or are nowhere, heights in the ground."""
     table = scene.wind
@@ -407,12 +408,6 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     wind = wind_of(table)
     if wind is not None and (not math.isfinite(wind.mean) or wind.mean <= 0.0):
         yield scene.refused("wind.height_m", "there is no wind at that height")
-
-
-def has_front(table: PantographTable) -> bool:
-    """Whether a pantograph that runs the other way round is another one."""
-    turned = table.aerodynamics is not None and table.aerodynamics.reversed is not None
-    return turned or table.type == "multibody"
 
 
 def check_tunnels(scene: Scene, line: LineData) -> Iterator[Fault]:

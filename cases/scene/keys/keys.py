@@ -22,8 +22,13 @@ from catenary.solver.effects import all_effects as effects
 ANY = "*"
 # Tables of a scene that its line, and how that is stepped, do not depend on.
 OF_THE_TRAIN = ("case", "train", "pantographs", "contact", "evaluation", "output", "test")
-# A longer key is no misspelt one.
-_LONGEST = 200
+# Characters of a key that a sentence repeats; a longer one is no misspelt one. And of a tag.
+_LONGEST, _LONGEST_TAG = 200, 60
+# The end of the sentence on an option of PETSc that is no key.
+ELSEWHERE = (
+    "is no PETSc option that a scene may give: solver options with bounded values only; all others "
+    "stand on the command line after --"
+)
 
 
 def known_keys(model: type[BaseModel], location: Sequence[int | str] = ()) -> tuple[str, ...]:
@@ -218,10 +223,6 @@ def _most_alike(key: str, known: list[str], last: str) -> str:
     return best.replace(ANY, "<name>")
 
 
-_LONGEST_KEY = 200  # of one in a sentence
-_LONGEST_TAG = 60
-
-
 def refusal(
     origin: Origin, key: str, value: object, why: str, *, by_default: bool = False
 ) -> Fault:
@@ -299,7 +300,7 @@ def schema_faults(
     faults: list[Fault] = []
     for one in found[:MOST_TOLD]:
         parts, field = without_kinds(one["loc"], model)
-        key = plain(".".join(_location(parts, raw)), _LONGEST_KEY) or "the scene"
+        key = plain(".".join(_location(parts, raw)), _LONGEST) or "the scene"
         faults.append(Fault(key, _sentence(dict(one), key, parts, field, model, origin)))
     return faults, max(0, len(found) - MOST_TOLD)
 
@@ -379,10 +380,3 @@ def _location(loc: Sequence[int | str], raw: Any) -> list[str]:
         else:
             raw = None
     return parts
-
-
-# The end of the sentence on any other option.
-ELSEWHERE = (
-    "is no PETSc option that a scene may give: solver options with bounded values only; all others "
-    "stand on the command line after --"
-)

@@ -14,7 +14,7 @@ class Table(BaseModel):
     """A table of ``case.toml``.
 
     Strict: "20 kN" is not a number and 1 is not true. Validators raise ``ValueError`` with a
-    predicate ("must be ...") that ``messages.sentence`` completes with key, value and place.
+    predicate ("must be ...") that ``keys.schema_faults`` completes with key, value and place.
     """
 
     # Validators are built at their first use: the one of a scene includes those of all its tables.
@@ -105,12 +105,17 @@ WireName = Annotated[str, Field(min_length=1, max_length=100)]
 PAIR = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=2, max_length=2)]
 
 
+def ascending_pairs(pairs: list[list[float]]) -> list[list[float]]:
+    """The pairs, whose first numbers must ascend."""
+    ascending([pair[0] for pair in pairs], "its first numbers")
+    return pairs
+
+
 def within(most: float) -> Callable[[list[list[float]]], list[list[float]]]:
     """The check that pairs have ascending first numbers and deviations up to ``most`` [m]."""
 
     def check(pairs: list[list[float]]) -> list[list[float]]:
-        ascending([pair[0] for pair in pairs], "its first numbers")
-        for at, value in pairs:
+        for at, value in ascending_pairs(pairs):
             if abs(value) > most:
                 raise ValueError(f"must stay within {most:g} m, but is {value:g} m at {at:g}")
         return pairs

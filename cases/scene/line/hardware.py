@@ -30,6 +30,10 @@ PreSag = Annotated[float, Field(ge=-1000, le=1000)]
 DropperPosition = Annotated[float, Field(gt=0, le=500)]
 # Of droppers in tension: the least and the most of EA, or of the slope of a curve [N].
 _LEAST, _MOST = 1.0, 1e9
+# Span lengths are written in decimal; two that differ by less are the same one.
+_SAME_SPAN = 1e-6
+# Droppers of a span of which some hang lower than the first and the last one.
+FEWEST_SAGGING = 3
 
 
 def _is_curve(pairs: list[list[float]]) -> list[list[float]]:
@@ -199,12 +203,6 @@ class AuxiliaryDropperTable(HangingTable):
         if any(pattern.pre_sag_mm is not None for pattern in self.patterns or []):
             raise ValueError("takes no pre_sag_mm in patterns: the auxiliary wire hangs level")
         return self
-
-
-# Span lengths are written in decimal; two that differ by less are the same one.
-_SAME_SPAN = 1e-6
-# Droppers of a span of which some hang lower than the first and the last one.
-FEWEST_SAGGING = 3
 
 
 def dropper_kind(table: HangingTable, lower_clamp: float) -> DropperKind:
@@ -397,10 +395,6 @@ class FittingTable(Table):
     mass_kg: float = Field(gt=0, le=200, description="its mass")
 
 
-# Of a stop above a steady arm whose stiffness no scene gives [N/m].
-_STOP_STIFFNESS = 1e5
-
-
 def steady_arm(table: SteadyArmTable) -> SteadyArm:
     """A steady arm."""
     tilt = table.inclination_deg
@@ -412,7 +406,7 @@ def steady_arm(table: SteadyArmTable) -> SteadyArm:
         holds_height=table.holds_height,
         inclination=None if tilt is None else angle_from_deg(tilt),
         uplift_stop=table.uplift_stop_m,
-        stop_stiffness=table.uplift_stop_stiffness_N_per_m or _STOP_STIFFNESS,
+        stop_stiffness=table.uplift_stop_stiffness_N_per_m or SteadyArm.stop_stiffness,
         by_radial_force=table.stiffness_by_radial_force,
         registration_stiffness=table.registration_stiffness_N_per_m,
     )

@@ -29,7 +29,7 @@ from catenary.cases.scene.line.wires import (
     clamped_wire_of,
     conductor,
 )
-from catenary.meshgen.line import Clamps, SteadyArms, Supports
+from catenary.meshgen.line import Clamps, SteadyArms, Supports, mast_places
 from catenary.meshgen.topologies.line_data import (
     AuxiliaryWire,
     Course,
@@ -40,7 +40,7 @@ from catenary.meshgen.topologies.line_data import (
     Overlaps,
     Twin,
 )
-from catenary.meshgen.wires import Conductor, Role
+from catenary.meshgen.wires import SAME_PLACE, Conductor, Role
 from catenary.solver.problem.ends import AlongTrack, Tensioner
 
 
@@ -107,7 +107,7 @@ def _contact_of(
     slowest = min(contact, key=lambda wire: wire.conductor.wave_speed)
     assert slowest.heights is not None
     if slowest.lateral is not None:
-        supports = np.concatenate([[0.0], np.cumsum(span_lengths(table))])
+        supports = mast_places(span_lengths(table))
         stagger = tuple(slowest.lateral.at(supports).tolist())
     return max(slowest.heights.value), slowest.conductor, stagger
 
@@ -152,14 +152,13 @@ def span_lengths(table: LineTable) -> tuple[float, ...]:
 
 # Values of ``start`` and ``end`` of a wire besides names of wires.
 TENSIONER, FIXED = "tensioner", "fixed"
-_INSIDE = 1e-6  # [m]
 
 
 def free_wires(line: LineTable, spans: tuple[float, ...]) -> tuple[FreeWire, ...] | None:
     """The wires of a free line, None of another one."""
     if line.wires is None:
         return None
-    masts = np.concatenate([[0.0], np.cumsum(spans)])
+    masts = mast_places(spans)
     return tuple(_wire(line, table, masts) for table in line.wires)
 
 
@@ -208,7 +207,7 @@ def _tensioned(
     given = table.start if side == 0 else table.end
     if given is not None:
         return given == TENSIONER
-    at_end = all(abs(stretch[side] - masts[side]) < _INSIDE for stretch in stretches)
+    at_end = all(abs(stretch[side] - masts[side]) < SAME_PLACE for stretch in stretches)
     return None if at_end else False
 
 
@@ -257,7 +256,7 @@ def free_links(
     """
     if line.links is None or wires is None:
         return None
-    masts = np.concatenate([[0.0], np.cumsum(spans)])
+    masts = mast_places(spans)
     by_name = {wire.name: wire for wire in wires}
     links: list[FreeLink] = []
     for i, table in enumerate(line.links):
@@ -293,7 +292,7 @@ def _places(
     if table.supports is not None:
         return tuple(masts[table.supports].tolist())
     inner = masts[1:-1].tolist()
-    return tuple(x for x in inner if wire is not None and wire.passes(x, -_INSIDE))
+    return tuple(x for x in inner if wire is not None and wire.passes(x, -SAME_PLACE))
 
 
 def _droppers(
@@ -304,7 +303,7 @@ def _droppers(
         sag = tuple(map(length_from_mm, table.pre_sag_mm or [0.0] * len(table.at_m)))
         at = tuple(table.at_m)
         return FreeDroppers(table.name, kind, table.upper, table.lower, at, at, sag)
-    starts = np.concatenate([[0.0], np.cumsum(spans)])
+    starts = mast_places(spans)
     places: list[float] = []
     sags: list[float] = []
     first, last = line.transition.n_spans_start, line.n_spans - line.transition.n_spans_end

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import PAIR, Table, ascending, exactly_one
+from catenary.cases.scene.keys.table import PAIR, Table, ascending, ascending_pairs, exactly_one
 from catenary.cases.scene.keys.units import speed_from_km_h
 from catenary.mbs.air import Polynomial, Uplift
 from catenary.mbs.air import Table as SpeedTable
@@ -18,7 +18,7 @@ _STIFFEST = 1e8
 
 
 def _rising(pairs: list[list[float]]) -> list[list[float]]:
-    ascending([pair[0] for pair in pairs], "its first numbers")
+    ascending_pairs(pairs)
     for (x, low), (next_x, high) in zip(pairs[:-1], pairs[1:], strict=True):
         if high < low:
             raise ValueError(f"must not fall, but its force goes from {low:g} to {high:g} N")

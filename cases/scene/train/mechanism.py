@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from catenary.cases.scene.keys.table import Table, ascending, either, exactly_one
+from catenary.cases.scene.keys.table import Table, ascending, ascending_pairs, either, exactly_one
 from catenary.cases.scene.train.head import SomeInertia, SomeMass
 from catenary.mbs.rigid.bodies import SPACE
 
@@ -37,15 +37,10 @@ def _at_most_one_long(turn: list[float]) -> list[float]:
     return turn
 
 
-def _growing(pairs: list[list[float]]) -> list[list[float]]:
-    ascending([pair[0] for pair in pairs], "its first numbers")
-    return pairs
-
-
 Axis = Annotated[Point, AfterValidator(_has_length)]
 Turn = Annotated[Point, AfterValidator(_at_most_one_long)]
 Pairs = Annotated[
-    list[_PAIR], Field(min_length=2, max_length=1000), AfterValidator(_growing)
+    list[_PAIR], Field(min_length=2, max_length=1000), AfterValidator(ascending_pairs)
 ]  # a characteristic, straight between its points and beyond its ends
 _X, _Y, _Z = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]
 _ORIGIN = [0.0, 0.0, 0.0]

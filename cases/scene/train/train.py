@@ -23,10 +23,10 @@ from catenary.mbs.vehicle import (
     Irregularity,
     Sideways,
     Source,
+    Spline,
     Vehicle,
     VehicleMotion,
 )
-from catenary.mbs.vehicle import Table as MotionOf
 
 
 class PlacementTable(Table):
@@ -277,6 +277,6 @@ def _sources(table: MotionTable | None) -> tuple[Source, ...]:
     return tuple(found)
 
 
-def _table(pairs: Course, along_track: bool) -> MotionOf:
+def _table(pairs: Course, along_track: bool) -> Spline:
     points, values = zip(*pairs, strict=True)
-    return MotionOf(points, values, along_track)
+    return Spline(points, values, along_track)

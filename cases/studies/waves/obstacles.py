@@ -23,11 +23,11 @@ from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.make_line import make_line
 from catenary.solver.model import beam
 from catenary.solver.model.matrices import whole_matrix
-from catenary.solver.model.model import Block, Model, wire_elements
+from catenary.solver.model.model import Block, Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping, Numerics, Problem
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.waves.reflection import answer, change_of_wire, scattered
+from catenary.solver.waves.reflection import answer_of, change_of_wire, scattered
 
 # Wire to both sides of the obstacle, and stations before and behind it [m].
 HALF, STATION = 600.0, 60.0
@@ -88,8 +88,8 @@ def measured(
     omega = 2 * np.pi * frequency
     seen = 2.0 / DT * np.tan(0.5 * omega * DT)
     back, onward = np.zeros((2, f, n, n), dtype=complex)
-    delays = [answer(wire, seen).wavenumber * STATION for wire in bench.wires]
-    beyond = [answer(bench.beyond or wire, seen).wavenumber * STATION for wire in bench.wires]
+    delays = [answer_of(wire, seen).wavenumber * STATION for wire in bench.wires]
+    beyond = [answer_of(bench.beyond or wire, seen).wavenumber * STATION for wire in bench.wires]
     for struck in range(n):
         time, before, behind = _signals(bench, model, struck)
         change = np.exp(-1j * omega[:, None] * time)
@@ -142,7 +142,7 @@ def _model(bench: Bench, problem: Problem) -> Model:
 
 def _change(model: Model, wire: Wire, beyond: Conductor) -> None:
     """Make a wire another one beyond the middle: its elements get the difference of both wires."""
-    dofs, length = wire_elements(model, wire.name, ("w", "theta_y"))
+    dofs, length = model.wire_elements(wire.name)
     there = model.mesh.x(model.mesh.elements(wire.name)).min(axis=1) > HALF - 1e-6
     dofs, length = dofs[there], length[there]
     mass = beam.mass(length, beyond.mass_per_length - wire.mass_per_length)

@@ -16,7 +16,7 @@ from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import wire_words
 from catenary.postproc.report.pictures.figures import COLOURS, GREY, LIGHT, own_style
-from catenary.solver.statics.form_finding import Equilibrium
+from catenary.solver.model.rest_shape import Equilibrium
 
 # Of contact wires, messenger wires, and all further roles in their order.
 _COLOUR = dict(zip(Role, (COLOURS[1], COLOURS[0], *COLOURS[2:]), strict=False))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catenary.meshgen.wires import End
+from catenary.meshgen.wires import SAME_PLACE, End
 from catenary.solver.effects.effect import Effect, register
 from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (built before)
 from catenary.solver.model import axial_motion
@@ -15,7 +15,6 @@ from catenary.solver.model.alike import alike
 from catenary.solver.model.link_directions import across_droppers
 from catenary.solver.model.links import PULLS, PUSHES, Direction, law, slips
 from catenary.solver.model.model import Block
-from catenary.solver.model.unknowns import SAME_STATION
 from catenary.solver.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -146,7 +145,7 @@ def _has_tensioner(problem: Problem) -> bool:
     along, masts = problem.along, problem.line.support_positions[[0, -1]]
     line_ends = float(masts[0]), float(masts[1])
     has_one = any(
-        along.tensioned(piece.x[end], line_ends, SAME_STATION)
+        along.tensioned(piece.x[end], line_ends, SAME_PLACE)
         if piece.tensioned[end] is None
         else piece.tensioned[end]
         for wire in problem.line.wires

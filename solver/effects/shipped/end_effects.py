@@ -52,7 +52,6 @@ def layer_blocks(model: Model, begin: float, end: float, damping: float) -> list
 
 # The component that lines beyond an end are in the damping: the line's.
 _BEYOND = "line_beyond"
-_SIDES = "start", "end"
 
 
 def _layers(builder: ModelBuilder) -> None:
@@ -71,7 +70,7 @@ def _going_on(laws: Simulated, problem: Problem) -> Simulated:
 
 def _lines_beyond(builder: ModelBuilder) -> None:
     # Compiled loops and transforms, which lines that do not go on need not import.
-    from catenary.solver.ends import StepSums, line_beyond, periodic_end
+    from catenary.solver.ends import SIDES, StepSums, line_beyond, periodic_end
     from catenary.solver.model.loads import MemoryLoad
 
     model, problem = builder.model, builder.problem
@@ -88,7 +87,7 @@ def _lines_beyond(builder: ModelBuilder) -> None:
                 ends.append(periodic_end(beyond, side, damping, sums))
             except InputError as error:
                 raise InputError(
-                    f"line.ends.{_SIDES[side]}.kind is periodic, but this line cannot go on: "
+                    f"line.ends.{SIDES[side]}.kind is periodic, but this line cannot go on: "
                     f"{error}, as where nothing holds a wire"
                 ) from error
     for end in ends:  # once both are found, as these are no part of what goes on

@@ -12,12 +12,12 @@ from catenary.solver.effects.shipped import vertical_effects  # noqa: F401  (bui
 from catenary.solver.model.link_directions import sideways_of_droppers
 from catenary.solver.model.links import Direction, law
 from catenary.solver.model.model import Block
+from catenary.solver.model.unknowns import LEVEL
 
 if TYPE_CHECKING:
     from catenary.meshgen.line import SteadyArms
     from catenary.solver.model.builder import ModelBuilder
 
-PLANE = ("v", "theta_z")
 # Parts of unit vectors along the track below this are none: round-off [-].
 _UPRIGHT = 1e-9
 
@@ -25,7 +25,7 @@ _UPRIGHT = 1e-9
 def _lateral(builder: ModelBuilder) -> None:
     mesh, line = builder.mesh, builder.problem.line
     for wire in reversed(line.wires):
-        builder.add_wire(wire.name, PLANE)
+        builder.add_wire(wire.name, LEVEL)
     _pendulums(builder)
     builder.add_clamps("v")
     barred = np.array([arms.kind.length > 0.0 for arms in line.steady_arms], dtype=bool)
@@ -78,7 +78,7 @@ register(
         "lateral bending, tension and mass of all wires; droppers as pendulums, arms as bars",
         "tensioned beam in the lateral plane; bars with geometric stiffness",
         default=False,
-        unknowns_of_wire=lambda wire: PLANE,
+        unknowns_of_wire=lambda wire: LEVEL,
         build=_lateral,
         of_form=True,
         law=lambda laws, p: replace(laws, lateral=True),

@@ -1,4 +1,4 @@
-"""Effects of every line and train: motion in height, weight, damping, contact, incidents."""
+"""Effects in the vertical plane: wires and what hangs and holds them, droppers to incidents."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from catenary.meshgen.wires import Profile
 from catenary.solver.effects.effect import Effect, Limit, register
+from catenary.solver.model.unknowns import UPRIGHT
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
 from catenary.solver.problem.problem import Problem, Simulated, TargetHeight, slowest_wave_speed
@@ -132,7 +133,7 @@ register(
         "vertical motion of the tensioned wires",
         "wire bending and tension, droppers, messenger supports, anchors",
         "paper eq. (2.1)",
-        unknowns_of_wire=lambda wire: ("w", "theta_y"),
+        unknowns_of_wire=lambda wire: UPRIGHT,
         always=True,
         build=_vertical,
     ),

@@ -19,11 +19,11 @@ from catenary.solver.contact.forces_on_line import FollowedLinks, ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.kernels import native
 from catenary.solver.model.gauges import Gauges, gauges_of
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.model.switching_links import NO_LINKS, padded, some_of
 from catenary.solver.problem.watched_links import GAUGES
 from catenary.solver.schemes.scheme import Scheme
 from catenary.solver.statics.after_incidents import ChangedLine
-from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.time_loop.views.channels import (
     CHANNELS,
     Energies,
@@ -36,6 +36,11 @@ from catenary.solver.time_loop.views.checkpoints import Checkpoints, State
 from catenary.solver.time_loop.views.observers import Stage, StepView
 from catenary.solver.time_loop.views.shown_line import LineEnergy, ShownMotion
 from catenary.solver.window.moving_columns import MovingColumns, columns_of
+
+# Parts of a step that can be seen, more with each.
+_ROW, _MOTION, _STATE = range(3)
+# Channels of the first tables of ``shown.columns``.
+_OF_COLUMNS = ("arm_uplift", "dropper_force")
 
 
 class RowLayout:
@@ -100,12 +105,6 @@ def _part_of(shown: np.ndarray, sources: Sources, array: np.ndarray) -> slice | 
         if 0 <= begin and begin + array.nbytes <= whole.nbytes and array.flags.c_contiguous:
             return slice(begin // 8, begin // 8 + array.size)
     return None
-
-
-# Parts of a step that can be seen, more with each.
-_ROW, _MOTION, _STATE = range(3)
-# Channels of the first tables of ``shown.columns``.
-_OF_COLUMNS = ("arm_uplift", "dropper_force")
 
 
 class Showing:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.interface import drive_width, named
+from catenary.mbs.interface import drive_width, drives_by_name
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 
@@ -74,7 +74,7 @@ def test_lift_rises_as_half_a_cosine_and_stays() -> None:
     drives = np.zeros((6, drive_width(1)))
     pantograph.fill_drives(np.array([0.0, 0.1, 0.2, 0.3, 0.4, 7.0]), drives)
     # The base spring pulls with nothing once the only mass, the head, is at its nominal height.
-    found = named(drives)["force"] - 100.0 * 5.5
+    found = drives_by_name(drives)["force"] - 100.0 * 5.5
     root = np.sqrt(0.5)
     expected = [0.0, 60.0 * (1 - root), 60.0, 60.0 * (1 + root), 120.0, 120.0]
     assert found == pytest.approx(expected, abs=120 * 4 * EPS)

@@ -9,7 +9,7 @@ import pytest
 
 from catenary.mbs.head.newmark_head import head_of
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.interface import drive_width, named
+from catenary.mbs.interface import drive_width, drives_by_name
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.kernels import native
@@ -32,7 +32,7 @@ def test_a_head_keeps_its_arrays_alive_and_writes_to_them() -> None:
     head, state, out = free_mass(10.0)
     gc.collect()
     row = np.zeros(drive_width(1))
-    named(row)["force"] = 50.0
+    drives_by_name(row)["force"] = 50.0
     for _ in range(2000):
         assert head.step(row)
         head.advance(np.array([20.0]))
@@ -68,7 +68,7 @@ def test_a_pantograph_may_outlive_what_it_was_made_by() -> None:
     row = one.row.copy()
     del one
     gc.collect()
-    named(row)["force"] = 500.0
+    drives_by_name(row)["force"] = 500.0
     before = position.copy()
     assert head.step(row)
     head.advance(np.zeros(1))

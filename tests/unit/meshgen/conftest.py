@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from catenary.meshgen.line import DropperKind, SteadyArm
+from catenary.meshgen.line import DropperKind, Line, SteadyArm
+from catenary.meshgen.topologies.all_topologies import make_line as line_from
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
 
@@ -43,6 +44,12 @@ def _line(**changes: object) -> LineData:
 def make_line() -> Callable[..., LineData]:
     """Four uneven spans with pre-sag and rising ends; keywords replace fields."""
     return _line
+
+
+@pytest.fixture(scope="session")
+def line() -> Line:
+    """The line of these spans."""
+    return line_from(_line())
 
 
 @dataclass

@@ -12,14 +12,17 @@ import pytest
 
 from catenary import InputError
 from catenary.meshgen.build import make_mesh, use_mesh
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.reader import read_mesh
 from catenary.meshgen.topologies.all_topologies import make_line as line_from
 from catenary.meshgen.topologies.line_data import LineData
 
 
-def test_a_file_in_any_order_and_numbering_is_read(by_hand: Any, tmp_path: Path) -> None:
-    mesh = read_mesh(by_hand.write(tmp_path / "own.msh"))
+def test_a_file_in_any_order_and_numbering_is_read(
+    by_hand: Any, line: Line, tmp_path: Path
+) -> None:
+    mesh = read_mesh(by_hand.write(tmp_path / "own.msh"), line)
     assert mesh.n_nodes == 10  # neither the stray node nor the one half-way down a dropper
     np.testing.assert_array_equal(mesh.x(mesh.wires[CONTACT_WIRE]), [0, 5, 10, 15, 20])
     np.testing.assert_array_equal(mesh.x(mesh.wires[MESSENGER_WIRE]), [0, 5, 10, 15, 20])
@@ -34,10 +37,10 @@ def test_a_file_in_any_order_and_numbering_is_read(by_hand: Any, tmp_path: Path)
 @pytest.mark.parametrize("version", [2.2, 4.1])
 @pytest.mark.parametrize("binary", [0, 1])
 def test_what_gmsh_saves_again_in_another_version_is_the_same_line(
-    make_line: Callable[..., LineData], tmp_path: Path, version: float, binary: int
+    line: Line, tmp_path: Path, version: float, binary: int
 ) -> None:
     first, second = tmp_path / "line.msh", tmp_path / "again.msh"
-    mesh = make_mesh(line_from(make_line()), 3, first)
+    mesh = make_mesh(line, 3, first)
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -51,7 +54,7 @@ def test_what_gmsh_saves_again_in_another_version_is_the_same_line(
         gmsh.write(str(second))
     finally:
         gmsh.finalize()
-    again = read_mesh(second)
+    again = read_mesh(second, line)
     np.testing.assert_allclose(again.points, mesh.points, atol=1e-12)
     for wire in (CONTACT_WIRE, MESSENGER_WIRE):
         np.testing.assert_array_equal(again.wires[wire], mesh.wires[wire])
@@ -189,21 +192,25 @@ REFUSED: dict[str, tuple[Callable[[Any], None], str]] = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_a_mesh_that_is_no_line_is_refused(by_hand: Any, tmp_path: Path, case: str) -> None:
+def test_a_mesh_that_is_no_line_is_refused(
+    by_hand: Any, line: Line, tmp_path: Path, case: str
+) -> None:
     change, sentence = REFUSED[case]
     change(by_hand)
     path = by_hand.write(tmp_path / "own.msh")
     with pytest.raises(InputError, match=sentence) as caught:
-        read_mesh(path)
+        read_mesh(path, line)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
 
 
-def test_arms_and_supports_may_be_left_empty_if_named(by_hand: Any, tmp_path: Path) -> None:
+def test_arms_and_supports_may_be_left_empty_if_named(
+    by_hand: Any, line: Line, tmp_path: Path
+) -> None:
     for name, dimension in (("steady_arms", 0), ("supports", 0), ("droppers", 1)):
         _without(name)(by_hand)
         by_hand.empty[name] = dimension
-    mesh = read_mesh(by_hand.write(tmp_path / "own.msh"))
+    mesh = read_mesh(by_hand.write(tmp_path / "own.msh"), line)
     assert mesh.steady_arms.size == mesh.supports.size == mesh.droppers.size == 0
 
 
@@ -219,32 +226,32 @@ def test_arms_and_supports_may_be_left_empty_if_named(by_hand: Any, tmp_path: Pa
     ],
 )
 def test_what_is_no_mesh_file_is_refused_in_silence(
-    tmp_path: Path, content: bytes, capfd: pytest.CaptureFixture[str]
+    line: Line, tmp_path: Path, content: bytes, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "own.msh"
     path.write_bytes(content)
     with pytest.raises(InputError, match="own.msh") as caught:
-        read_mesh(path)
+        read_mesh(path, line)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_truncated_file_is_refused(make_line: Callable[..., LineData], tmp_path: Path) -> None:
+def test_a_truncated_file_is_refused(line: Line, tmp_path: Path) -> None:
     path = tmp_path / "line.msh"
-    make_mesh(line_from(make_line()), 2, path)
+    make_mesh(line, 2, path)
     content = path.read_bytes()
     for share in (0.2, 0.5, 0.9):
         path.write_bytes(content[: int(share * len(content))])
         with pytest.raises(InputError, match=r"line\.msh"):
-            read_mesh(path)
+            read_mesh(path, line)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(line: Line, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"absent\.msh does not exist"):
-        read_mesh(tmp_path / "absent.msh")
+        read_mesh(tmp_path / "absent.msh", line)
 
 
-def test_elements_without_a_group_are_explained(by_hand: Any, tmp_path: Path) -> None:
+def test_elements_without_a_group_are_explained(by_hand: Any, line: Line, tmp_path: Path) -> None:
     first, second = by_hand.write(tmp_path / "own.msh"), tmp_path / "all.msh"
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
@@ -260,7 +267,7 @@ def test_elements_without_a_group_are_explained(by_hand: Any, tmp_path: Path) ->
     finally:
         gmsh.finalize()
     with pytest.raises(InputError, match=r"Mesh\.SaveAll = 0"):
-        read_mesh(second)
+        read_mesh(second, line)
 
 
 def _two_spans(make_line: Callable[..., LineData], **changes: object) -> LineData:

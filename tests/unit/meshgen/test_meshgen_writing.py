@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from catenary import InputError, RunBroken
 from catenary.meshgen.build import make_mesh
 from catenary.meshgen.gmsh_lines import write_mesh
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.reader import read_mesh
 from catenary.meshgen.topologies.all_topologies import make_line as line_from
@@ -310,11 +311,11 @@ def test_an_impossible_request_is_refused(
 
 
 def test_gmsh_prints_nothing_and_leaves_the_interrupt_alone(
-    make_line: Callable[..., LineData], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    line: Line, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     before = signal.getsignal(signal.SIGINT)
-    write_mesh(line_from(make_line()), 3, tmp_path / "line.msh")
-    read_mesh(tmp_path / "line.msh")
+    write_mesh(line, 3, tmp_path / "line.msh")
+    read_mesh(tmp_path / "line.msh", line)
     assert signal.getsignal(signal.SIGINT) is before
     assert not gmsh.isInitialized()
     assert capfd.readouterr() == ("", "")

@@ -22,10 +22,10 @@ from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.contents import RecordedLine
+from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Numerics, Placement, Problem, Train
 from catenary.solver.statics.elasticity import Elasticity
-from catenary.solver.statics.form_finding import Equilibrium
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
 

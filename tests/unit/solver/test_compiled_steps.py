@@ -34,7 +34,7 @@ from catenary.solver.schemes.scheme import OneSolve
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.march import Outcome
 from catenary.solver.time_loop.views.observers import Observer, Stage, StepView
-from catenary.solver.wind import along
+from catenary.solver.wind import forces_along
 
 LINE = replace(ac_simple_line(4), stagger=(0.2, -0.2, 0.2, -0.2, 0.2))
 TWO = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))
@@ -353,7 +353,7 @@ def test_an_observer_that_looks_at_each_state_is_shown_each(mesh: LineMesh) -> N
 
 def _loads(builder: ModelBuilder) -> None:
     """One load of each kind, along the contact wire."""
-    unknowns, weights = along(builder.model, CONTACT_WIRE, ("w", "theta_y"))
+    unknowns, weights = forces_along(builder.model, CONTACT_WIRE, ("w", "theta_y"))
     x = builder.mesh.x(builder.mesh.wires[CONTACT_WIRE])
     even = weights @ np.full(x.size, 3.0)
     builder.add_load(ShapeLoad(unknowns, even))

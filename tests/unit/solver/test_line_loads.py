@@ -20,7 +20,7 @@ from catenary.solver.model.loads import (
     harmonics,
     table,
 )
-from catenary.solver.wind import along
+from catenary.solver.wind import forces_along
 
 NOBODY = np.zeros(0, dtype=np.int64)
 WHOLE = Subdomain(0, 12, 0, 12, 0, 12)
@@ -108,7 +108,7 @@ def test_loads_along_a_wire_do_the_work_of_what_they_stand_for() -> None:
     mesh = mesh_of(line, 2)
     model = build(problem_of(line, HANGING), mesh, np.ones(mesh.droppers.shape[0]))
     points = np.array([10.0, 40.0, 55.0, 100.0])
-    unknowns, weights = along(model, CONTACT_WIRE, ("w", "theta_y"), points)
+    unknowns, weights = forces_along(model, CONTACT_WIRE, ("w", "theta_y"), points)
     nodes = mesh.wires[CONTACT_WIRE]
     x, q = mesh.x(nodes), np.array([3.0, -1.0, 2.0, 5.0])
     moved = np.zeros(model.n_dofs)

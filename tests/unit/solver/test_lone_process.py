@@ -11,35 +11,35 @@ from pathlib import Path
 import pytest
 from program import RANKS_ENVIRONMENT
 
-from catenary.base.process import SETTINGS, settings
+from catenary.base.process import MPI_SETTINGS, mpi_settings
 
 
 @pytest.fixture(autouse=True)
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
     of_ranks = "OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK", "OMPI_MCA_ess", "OMPI_MCA_pmix"
-    for name in (*SETTINGS, *of_ranks):
+    for name in (*MPI_SETTINGS, *of_ranks):
         monkeypatch.delenv(name, raising=False)
 
 
 def test_what_reaches_other_processes_is_left_out_while_mpi_starts() -> None:
     before = dict(os.environ)
-    with settings():
-        assert {name: os.environ[name] for name in SETTINGS} == SETTINGS
+    with mpi_settings():
+        assert {name: os.environ[name] for name in MPI_SETTINGS} == MPI_SETTINGS
     # A launcher that this process may start later has its networks.
     assert dict(os.environ) == before
 
 
 def test_what_the_environment_says_wins(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMPI_MCA_pml", "ucx")
-    with settings():
+    with mpi_settings():
         assert os.environ["OMPI_MCA_pml"] == "ucx" and "OMPI_MCA_btl" in os.environ
     assert os.environ["OMPI_MCA_pml"] == "ucx" and "OMPI_MCA_btl" not in os.environ
 
 
 def test_ranks_of_a_launcher_reach_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
-    with settings():
-        assert not set(SETTINGS) & set(os.environ)
+    with mpi_settings():
+        assert not set(MPI_SETTINGS) & set(os.environ)
 
 
 @pytest.mark.process
@@ -96,10 +96,10 @@ def test_the_program_hands_nothing_of_it_to_jobs_that_it_submits() -> None:
     """SLURM gives a job the environment of ``sbatch``: its ranks need the networks."""
     program = (
         "import os\n"
-        "from catenary.base.process import SETTINGS, world\n"
+        "from catenary.base.process import MPI_SETTINGS, world\n"
         "from catenary.cases.process.libraries import choose_settings\n"
         "choose_settings(); world()\n"
-        "print(set(SETTINGS) & set(os.environ))"
+        "print(set(MPI_SETTINGS) & set(os.environ))"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
