@@ -17,6 +17,8 @@ from catenary.meshgen.wires import Role
 from catenary.solver.time_loop.views import channels
 
 if TYPE_CHECKING:
+    from catenary.meshgen.line import Line
+    from catenary.meshgen.mesh import LineMesh
     from catenary.solver.model.rest_shape import Equilibrium
     from catenary.solver.statics.elasticity import Elasticity
 
