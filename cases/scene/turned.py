@@ -9,7 +9,7 @@ from catenary.base.errors import InputError
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.line.line_data import numbered, overlaps_of, span_lengths
 from catenary.cases.scene.load import scene_from
-from catenary.cases.scene.scene import Scene, line_of, resolved
+from catenary.cases.scene.scene import Scene, line_of, resolved, strips_ahead
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import SAME_PLACE
 from catenary.solver.problem.defects import LengthErrors
@@ -27,10 +27,10 @@ def turned(scene: Scene) -> Scene:
 
     Trains run towards greater x, so that the line is mirrored instead: x becomes L - x, with the
     length L of the line; heights and lateral positions stay. The order of pantographs stays: the
-    first one leads. The run-in keeps its length, unless the running range begins nearer to the
-    evaluated stretch. Heads, wind and curves are symmetric, so that the contact force is that of a
-    train in the other direction on the original line. Random errors of dropper lengths stay with
-    their droppers. Choices of what to record are dropped.
+    first one leads. The run-in keeps its length, unless the train has to begin nearer to the
+    evaluated stretch to be in the running range. Heads, wind and curves are symmetric, so that the
+    contact force is that of a train in the other direction on the original line. Random errors of
+    dropper lengths stay with their droppers. Choices of what to record are dropped.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def turned(scene: Scene) -> Scene:
         wind["stretches"] = _stretches(wind.get("stretches", []), length)
     for motion in ("vertical", "lateral"):
         _turn_course(raw.get("vehicle", {}).get(motion) or {}, length)
-    _turn_run(raw, line, length)
+    _turn_run(raw, scene, line, length)
     return scene_from(raw, Origin(f"{scene.origin.file}, turned round", recorded=True))
 
 
@@ -210,15 +210,18 @@ def _turn_defect(defect: dict[str, Any], line: Line, length: float) -> None:
     _turn_stretch(defect, length)
 
 
-def _turn_run(raw: dict[str, Any], line: Line, length: float) -> None:
+def _turn_run(raw: dict[str, Any], scene: Scene, line: Line, length: float) -> None:
     train, evaluated = raw["train"], raw["evaluation"]
     begin, end = evaluated["from_m"], evaluated["to_m"]
     _turn_stretch(evaluated, length)
     first, last = line.running_range
+    # All strips of all pantographs run within the range.
+    ahead = strips_ahead(scene)
+    rear = scene.train.pantographs[-1].behind_m + ahead[-1]
     start = evaluated["from_m"] - (begin - train["start_m"])
-    train["start_m"] = _place(max(start, length - last))
+    train["start_m"] = _place(max(start, length - last + rear))
     stop = evaluated["to_m"] + (train["end_m"] - end)
-    train["end_m"] = _place(min(stop, length - first))
+    train["end_m"] = _place(min(stop, length - first - max(ahead)))
 
 
 def _stretches(tables: Sequence[dict[str, Any]], length: float) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import io
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from measuring import check
 from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 
+import catenary
 from catenary import InputError
 from catenary.cases.run.prepared import rest_of, sound_rest
 from catenary.cases.scene.load import recorded_scene
@@ -85,6 +87,18 @@ def test_statistics_change_as_runs_with_other_values() -> None:
         high, low = (seen.uplift.max() for _, seen in both)
         limit = 1e-12 / step + 1e-5 * abs(by_uplift)
         check(f"uplift by {key}", by_uplift, (high - low) / (2 * step), within=limit)
+
+
+def test_statistics_are_those_of_a_run_near_its_start() -> None:
+    """The filter reaches some 0.1 s about a record: there the first one of a run counts."""
+    near = ("train.raise_time_s=0.02", "evaluation.from_m=67", "evaluation.to_m=125")
+    words = (*TINY, "train.end_m=127", *near)
+    found = sensitivity_of(load_scene(CASE, words), KEYS[:1], MPI.COMM_SELF)
+    (seen,) = found.statistics
+    changes = {key: json.loads(value) for key, value in (word.split("=") for word in words)}
+    run = catenary.run(catenary.load(CASE).replace(changes)).statistics.iloc[0]
+    for name in ("mean", "std", "max", "min"):
+        check(name, seen[name], run[f"{name}_N"], within=1e-9 * run["mean_N"])
 
 
 def test_the_table_is_ranked_and_in_the_units_of_keys() -> None:
@@ -297,6 +311,7 @@ def test_the_usual_parameters_are_those_of_the_train_and_the_line() -> None:
 def test_a_step_follows_from_the_size_of_a_value() -> None:
     assert Parameter("line.contact_wire.tension_N", (2e4,)).step == pytest.approx(6.0)
     assert Parameter("line.dropper.pre_sag_mm", (0.0, 0.0)).step == pytest.approx(0.05)
+    assert Parameter("defects.0.at_m", (5000.0,)).step == pytest.approx(1e-4)
     assert Parameter("line.damping.beta_per_s", (0.0,)).change == 1.0
     # A conductor rail has some 100 N, of which a kilonewton is no small change.
     assert Parameter("line.contact_wire.tension_N", (100.0,)).change == 1.0

@@ -129,6 +129,21 @@ def test_the_run_in_is_as_long_in_both_directions() -> None:
     assert near.train.start_m == 0.0  # 990 m of run-in do not fit
 
 
+def test_the_whole_train_begins_on_the_line() -> None:
+    """With the strips of the last pantograph, where a run-in of 990 m does not fit."""
+    train = (
+        "train.pantographs.1.name=three_masses",
+        "train.pantographs.1.behind_m=60",
+        "pantographs.three_masses.strips.number=2",
+        "pantographs.three_masses.strips.spacing_m=0.5",
+    )
+    near = turned(scene_of("evaluation.from_m=1100", "evaluation.to_m=1500", *train))
+    assert near.train.start_m == 60.25
+    # Nor does a run-out of 240 m, to 1650 m.
+    stretch = "evaluation.from_m=200", "evaluation.to_m=1400", "train.end_m=1640"
+    assert turned(scene_of("train.start_m=100", *stretch, *train)).train.end_m == 1649.75
+
+
 def test_a_symmetric_line_is_its_own_mirror_image() -> None:
     scene = scene_of()
     assert plain(turned(scene)) == plain(scene)

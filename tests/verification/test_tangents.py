@@ -359,6 +359,12 @@ SCENES: dict[str, tuple[str, list[str], dict[str, float]]] = {
         [*SHORT, f"irregularities.contact_wire_height.by_place={HEIGHTS}"],
         {"irregularities.contact_wire_height.3": 1e-3},
     ),
+    # A set-up bends with the place within an element, of a metre, however far along the line it is.
+    "hard spot": (
+        "en50318_2002",
+        [*SHORT, 'defects=[{type="hard_spot",at_m=201.3,mass_kg=3.0,stiffness_N_per_m=5e3}]'],
+        {"defects.0.at_m": 1e-6, "defects.0.mass_kg": 1e-5},
+    ),
     "impact": (
         "en50318_2002",
         [*SHORT, *RESTITUTION, "effects.contact_damping=true"],
@@ -482,7 +488,7 @@ def is_difference(case: str, words: list[str], steps: dict[str, float]) -> None:
             check(f"{what} by {key}", getattr(own, by)[:n, number], expected, within=limit)
 
 
-@pytest.mark.parametrize("name", few(SCENES, "two pantographs", "kinematic"))
+@pytest.mark.parametrize("name", few(SCENES, "two pantographs", "kinematic", "hard spot"))
 def test_tangents_are_differences_of_marches(name: str) -> None:
     is_difference(*SCENES[name])
 

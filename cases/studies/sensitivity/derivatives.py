@@ -188,7 +188,7 @@ def parts_of(changes: Sequence[Change], at_rest: LineAtRest, now: SetUp) -> Iter
 def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
     statistics = []
     for number, within in _within(marched, at_rest):
-        force = filters.low_pass(marched.force[:, number], marched.dt)[within]
+        force = filters.low_pass(_from_start(marched.force[:, number]), marched.dt)[within]
         figures = ("mean", "std", "max", "min")
         statistics.append({name: float(getattr(force, name)()) for name in figures})
     n = len(statistics)
@@ -206,10 +206,11 @@ def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
 
 
 def _within(marched: Tangents, at_rest: LineAtRest) -> Iterator[tuple[int, np.ndarray]]:
-    """Each pantograph's number, and which steps it is in the evaluated stretch."""
+    """Each pantograph's number, and in which records of a run it is in the evaluated stretch."""
     first, last = at_rest.problem.evaluation
     for number in range(marched.force.shape[1]):
         position = marched.position[:, number]
+        position = np.concatenate([position[:1] - marched.speed * marched.dt, position])
         if not covers(position, (first, last)):
             raise InputError(
                 f"a pantograph runs from {position[0]:.0f} to {position[-1]:.0f} m, and not "
@@ -218,15 +219,23 @@ def _within(marched: Tangents, at_rest: LineAtRest) -> Iterator[tuple[int, np.nd
         yield number, (position >= first) & (position <= last)
 
 
+def _from_start(values: np.ndarray) -> np.ndarray:
+    """Forces of all steps, or their derivatives, with what the record of a run begins with: none at
+    the start. The filter meets both ends of a record."""
+    return np.concatenate([np.zeros_like(values[:1]), values])
+
+
 def _add_derivatives(
     found: Sensitivity, marched: Tangents, at_rest: LineAtRest, parameters: list[Parameter]
 ) -> None:
     """Add the derivatives of a march by some parameters."""
-    by_place = marched.by_position / marched.speed
+    by_position = marched.by_position
+    by_place = np.concatenate([2.0 * by_position[:1] - by_position[1:2], by_position])
+    by_place /= marched.speed
     of_all = [
         statistics.force_derivatives(
-            marched.force[:, number],
-            marched.by_force[:, :, number],
+            _from_start(marched.force[:, number]),
+            _from_start(marched.by_force[:, :, number]),
             within,
             marched.dt,
             by_place[:, :, number],

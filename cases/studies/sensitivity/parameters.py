@@ -74,6 +74,10 @@ _STEP_OF_SHAPE = 1e-3
 # Of a height of 5 m, which moves laws of pantographs as a whole: a part of it would lead beyond
 # their bends, as a limiter's. In it a set-up is linear, and known to 1e-15 m.
 _STEP_OF_HEIGHT = 1e-6
+# Of a place along the track [m], however far that is from the start of the line: shape functions
+# bend within an element, of some 0.5 m, and are known to 1e-13 m.
+_STEP_OF_PLACE = 1e-4
+_PLACES = ("at_m", "from_m", "to_m", "start_m", "behind_m")
 _STEP_OF_ZERO = {"mm": 0.05}
 _USUAL_STEP_OF_ZERO = 1e-4
 # Tables without anything of the march.
@@ -135,6 +139,9 @@ class Parameter:
             return max(_STEP_OF_SHAPE * self.size, _STEP_OF_ZERO["mm"])
         if self.key.endswith("nominal_height_m"):
             return _STEP_OF_HEIGHT
+        parts = self.key.split(".")
+        if parts[-1] in _PLACES and parts[0] != "pantographs":
+            return _STEP_OF_PLACE
         if self.size > 0.0:
             return _STEP * self.size
         return _STEP_OF_ZERO.get(self.unit, _USUAL_STEP_OF_ZERO)
