@@ -23,7 +23,6 @@ from catenary.postproc.files.own_files import (
 )
 from catenary.postproc.read.results import Results
 from catenary.postproc.read.validation import Records
-from catenary.postproc.report import csv_tables
 from catenary.postproc.report.page import (
     EvaluatedRun,
     Picture,
@@ -135,7 +134,7 @@ def write_report(
         criteria = criteria_of(results, statistics)
         run = EvaluatedRun(results, statistics, criteria, *measured)
         summary = as_json(summarise(results, statistics, criteria, run.indicators))
-        content: dict[str, bytes | str] = {"droppers.csv": csv_tables.droppers_csv(results)}
+        content: dict[str, bytes | str] = {"droppers.csv": line.droppers_csv(results)}
         content |= beside or {}
         registration = results.registration()
         if registration is not None:
