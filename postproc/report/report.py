@@ -15,12 +15,7 @@ from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.disk import write_into
-from catenary.postproc.files.own_files import (
-    CHANNEL_PICTURE,
-    PICTURES,
-    REPORT_FILES,
-    remove_stale,
-)
+from catenary.postproc.files.own_files import CHANNEL_PICTURE, PICTURES, REPORT_FILES, remove_stale
 from catenary.postproc.read.results import Results
 from catenary.postproc.read.validation import Records
 from catenary.postproc.report.page import (

@@ -100,10 +100,7 @@ def _axes(axes: Axes, own: str, panels: Sequence[Axes]) -> dict[str, Any]:
     box = axes.get_position()
     x: dict[str, Any] = {"domain": [box.x0, box.x1], "anchor": f"y{own}"}
     y: dict[str, Any] = {"domain": [box.y0, box.y1], "anchor": f"x{own}"}
-    for axis, limits, entry in (
-        (axes.xaxis, axes.get_xlim(), x),
-        (axes.yaxis, axes.get_ylim(), y),
-    ):
+    for axis, limits, entry in ((axes.xaxis, axes.get_xlim(), x), (axes.yaxis, axes.get_ylim(), y)):
         is_log = axis.get_scale() == "log"
         ends = np.log10(limits) if is_log else np.asarray(limits)
         entry |= {
