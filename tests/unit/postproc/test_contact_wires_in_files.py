@@ -18,7 +18,7 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.evaluate.error_indicators import indicate
-from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.read.results import ContactProfile, LineOfRun, Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report.pictures import figures, force_pictures, line_pictures
@@ -203,7 +203,7 @@ def test_films_show_the_wire_that_is_touched(tmp_path: Path, usual: dict[str, An
     """In an overlap the lower one, whatever its name and mean height are."""
     path = recorded(overlap(), tmp_path, usual)
     with Results(path) as results:
-        data = film_data(results)
+        data = FilmData(results)
         profiles = results.contact_profiles()
     assert data.contacts == [FIRST, SECOND]
     assert data.touched(10.0) == FIRST and data.touched(40.0) == SECOND
