@@ -500,7 +500,7 @@ class _Closed:
 def _write(scene: Scene, path: Path) -> None:
     """Write the line of a scene, ready for steps. Not collective."""
     alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.run.prepared import prepare_line
+    from catenary.cases.run.at_rest import prepare_line
 
     prepare_line(scene, path)
 

@@ -277,7 +277,7 @@ def prepare(
 ) -> None:
     """Serial."""
     path = catenary.prepare(words.scene(), out, force=force)
-    from catenary.cases.run.prepared import HEADER, LIBRARY
+    from catenary.cases.run.at_rest import HEADER, LIBRARY
 
     with catenary.Simulation(path) as line:
         steps = f"{line.steps_left} steps of {line.dt * 1e3:g} ms"

@@ -12,6 +12,7 @@ compares what follows with marches.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from catenary.cases.scene.scene import Scene, problem_of
@@ -66,18 +67,6 @@ class WaveLine(NamedTuple):
         return 0.5 * (self.beta + self.alpha * self.edge**2)
 
 
-class Course(NamedTuple):
-    """Course of one pantograph: start and end [m], its speed [m/s] and the evaluated stretch [m];
-    ``leader`` and ``rear`` are the starts of the foremost and the last pantograph [m]."""
-
-    start: float
-    end: float
-    speed: float
-    stretch: tuple[float, float]
-    leader: float
-    rear: float
-
-
 class Meeting(NamedTuple):
     """Place [m] and time [s] at which a pantograph meets a wave."""
 
@@ -85,75 +74,144 @@ class Meeting(NamedTuple):
     time: float
 
 
-class Arrivals(NamedTuple):
-    """Waves that reach a pantograph, and when.
+class Course(NamedTuple):
+    """Course of a pantograph along a line, and the waves that reach it on the way.
 
     Attributes
     ----------
-    run_in, run_in_spans : distance from the start to the evaluated stretch [m], in spans [-]
-    start_share : rms of the start's remainder in the force history over the standard deviation,
-        estimated [-]
-    far_end, near_end : first wave from either end of the line, None if none arrives within the run
-    far_share : remaining amplitude of the least damped wave from the far end at the end of the
-        stretch, over its first one [-]
+    line : for waves
+    start, end, speed : of the pantograph [m], [m/s]
+    stretch : that is evaluated [m]
+    leader, rear : starts of the foremost and of the last pantograph [m]
+    lets_out : whether start and end of the line let waves out
+    window : distances behind the last and ahead of the foremost pantograph within which the line
+        moves [m], None if all of it does
+    name : of the pantograph
     """
 
-    run_in: float
-    run_in_spans: float
-    start_share: float
-    far_end: Meeting | None
-    near_end: Meeting | None
-    far_share: float
+    line: WaveLine
+    start: float
+    end: float
+    speed: float
+    stretch: tuple[float, float]
+    leader: float
+    rear: float
+    lets_out: tuple[bool, bool] = (False, False)
+    window: tuple[float, float] | None = None
+    name: str = ""
 
+    @property
+    def run_in(self) -> float:
+        """From the start to the evaluated stretch [m]."""
+        return self.stretch[0] - self.start
 
-def arrivals(line: WaveLine, course: Course) -> Arrivals:
-    """Waves that reach a pantograph on its course. Not collective."""
-    run_in = course.stretch[0] - course.start
-    return Arrivals(
-        run_in,
-        run_in / line.span,
-        start_share(line, course.speed, run_in),
-        _within(from_far_end(line, course), course),
-        _within(_from_near_end(line, course), course),
-        far_share(line, course),
-    )
+    @property
+    def run_in_spans(self) -> float:
+        """The same in spans [-]."""
+        return self.run_in / self.line.span
 
+    @property
+    def start_share(self) -> float:
+        """What the start leaves in the force history, see `start_share` [-]."""
+        return start_share(self.line, self.speed, self.run_in)
 
-def reflection_felt(line: WaveLine, course: Course) -> bool:
-    """Whether a wave from the far end is met in the evaluated stretch with an amplitude left."""
-    met = from_far_end(line, course)
-    return met is not None and met.at < course.stretch[1] and far_share(line, course) >= FELT
+    @property
+    def far_wave(self) -> Meeting | None:
+        """The first wave that returns from the far end, also after the run: c t = 2 L - x_leader -
+        x - v t; None if the train is as fast."""
+        way = 2.0 * self.line.end - self.leader - self.start
+        return self._met(way, self.line.speed + self.speed)
 
+    @property
+    def far_end(self) -> Meeting | None:
+        """The first wave that the far end reflects within the run. That of a window begins when the
+        window reaches it; what the window's own ends send back is in its error."""
+        met = None if self.lets_out[1] else self._within(self.far_wave)
+        if met is None or self.window is None:
+            return met
+        # Place of this pantograph when the window reaches the far end, and where it meets what is
+        # then reflected there.
+        here = self.line.end - self.window[1] - (self.leader - self.start)
+        at = here + self.speed * (self.line.end - here) / (self.speed + self.line.fastest)
+        later = Meeting(at, (at - self.start) / self.speed)
+        return met if at <= met.at else self._within(later)
 
-def from_far_end(line: WaveLine, course: Course) -> Meeting | None:
-    """The first wave that returns from the far end: c t = 2 L - x_leader - x - v t; None if the
-    train is as fast."""
-    if course.speed >= line.speed:
-        return None
-    time = (2.0 * line.end - course.leader - course.start) / (line.speed + course.speed)
-    return Meeting(course.start + course.speed * time, time)
+    @property
+    def near_end(self) -> Meeting | None:
+        """The first wave that the near end reflects and that catches up from behind within the run:
+        c t = x_rear + x + v t, from the near end; None if the train is as fast, or if the near end
+        is outside of the window."""
+        line = self.line
+        outside = self.window is not None and self.rear - self.window[0] >= line.start
+        if self.lets_out[0] or outside:
+            return None
+        way = self.rear + self.start - 2.0 * line.start
+        return self._within(self._met(way, line.speed - self.speed))
 
+    @property
+    def far_share(self) -> float:
+        """Share of its amplitude that a wave from the far end has kept at the end of the stretch.
 
-def _from_near_end(line: WaveLine, course: Course) -> Meeting | None:
-    """The first wave that the near end reflects and that catches up from behind: c t = x_rear + x +
-    v t, from the near end; None if the train is as fast."""
-    if course.speed >= line.speed:
-        return None
-    both = course.rear + course.start - 2.0 * line.start
-    time = both / (line.speed - course.speed)
-    return Meeting(course.start + course.speed * time, time)
+        Of all waves met at x the last one, which the leader sent, has travelled for the shortest
+        time, (2 (L - x) - d) / (c - v), d being its distance ahead. [-]
+        """
+        line, met = self.line, self.far_wave
+        if met is None or self.lets_out[1] or (self._within(met) and not self.far_end):
+            return 0.0
+        way = 2.0 * (line.end - self.stretch[1]) - (self.leader - self.start)
+        return math.exp(-line.decay * max(way, 0.0) / (line.speed - self.speed))
 
+    @property
+    def feels_reflection(self) -> bool:
+        """Whether a wave from the far end is felt in the evaluated stretch."""
+        met = self.far_end
+        return met is not None and met.at < self.stretch[1] and self.far_share >= FELT
 
-def far_share(line: WaveLine, course: Course) -> float:
-    """Share of its amplitude that a wave from the far end has kept at the end of the stretch.
+    @property
+    def least_end(self) -> float:
+        """Least place of the line's end without a perceptible reflection in the stretch [m]: waves
+        meet the pantograph later, or have decayed."""
+        line, last = self.line, self.stretch[1]
+        time = (last - self.start) / self.speed
+        unmet = 0.5 * ((line.speed + self.speed) * time + self.leader + self.start)
+        if line.decay == 0.0:
+            return unmet
+        way = -math.log(FELT) / line.decay * (line.speed - self.speed)
+        return min(unmet, last + 0.5 * (way + self.leader - self.start))
 
-    Of all waves met at x the last one, which the leader sent, has travelled for the shortest time,
-    (2 (L - x) - d) / (c - v), d being its distance ahead. [-]
-    """
-    if course.speed >= line.speed:
-        return 0.0
-    way = 2.0 * (line.end - course.stretch[1]) - (course.leader - course.start)
-    return math.exp(-line.decay * max(way, 0.0) / (line.speed - course.speed))
+    def _met(self, way: float, closing: float) -> Meeting | None:
+        """Where a wave that is so far away [m] and comes nearer so fast [m/s] is met."""
+        if self.speed >= self.line.speed:
+            return None
+        time = way / closing
+        return Meeting(self.start + self.speed * time, time)
+
+    def _within(self, met: Meeting | None) -> Meeting | None:
+        return met if met is not None and met.at <= self.end else None
+
+    def facts(self) -> dict[str, Any]:
+        """Facts in SI units and a sentence, plain enough for JSON."""
+        far, near = self.far_end or (None, None), self.near_end or (None, None)
+        ends = [
+            f"from the {side} end "
+            + ("not before the run ends" if at is None else f"at {at:.0f} m ({time:.1f} s)")
+            for side, (at, time) in (("far", far), ("near", near))
+        ]
+        return {
+            "start_m": self.start,
+            "run_in_m": self.run_in,
+            "run_in_spans": self.run_in_spans,
+            "start_share_of_std": self.start_share,
+            "far_end_met_at_m": far[0],
+            "far_end_met_at_s": far[1],
+            "far_end_share": self.far_share,
+            "near_end_met_at_m": near[0],
+            "near_end_met_at_s": near[1],
+            "says": f"{self.name}: {self.run_in:.0f} m or {self.run_in_spans:.1f} spans from start "
+            "to evaluated stretch, where start-up still affects the force by about "
+            f"{100 * self.start_share:.2g} % of sigma; reflections reach the pantograph "
+            f"{' and '.join(ends)}",
+        }
 
 
 def start_share(line: WaveLine, speed: float, run_in: float) -> float:
@@ -180,40 +238,22 @@ def run_in_for(line: WaveLine, speed: float) -> float:
     return float(optimize.brentq(more, 0.0, longest))
 
 
-def end_for(line: WaveLine, course: Course) -> float:
-    """Least place of the line's end without a perceptible reflection in the stretch [m]: waves meet
-    the pantograph later, or have decayed."""
-    time = (course.stretch[1] - course.start) / course.speed
-    unmet = 0.5 * ((line.speed + course.speed) * time + course.leader + course.start)
-    if line.decay == 0.0:
-        return unmet
-    way = -math.log(FELT) / line.decay * (line.speed - course.speed)
-    faded = course.stretch[1] + 0.5 * (way + course.leader - course.start)
-    return min(unmet, faded)
-
-
-def _within(met: Meeting | None, course: Course) -> Meeting | None:
-    return met if met is not None and met.at <= course.end else None
-
-
 def end_sentences(problem: Problem) -> tuple[str, str]:
     """Begin and end of the line, in words."""
     start, end = (f"{side} {_of_end(kind)}" for side, kind in zip(SIDES, problem.ends, strict=True))
     return start, end
 
 
-def _end_warnings(problem: Problem) -> list[str]:
+def _end_warnings(problem: Problem) -> Iterator[str]:
     """Sentences on how the ends of the line may spoil a run."""
     line, train = problem.line, problem.train
     masts, n = line.support_positions, line.n_spans
     start, end = problem.ends
     rear = train.start - max(place.behind for place in train.placements)
-    sentences = []
     if isinstance(start, AbsorbingLayer) and rear < masts[start.n_spans]:
-        sentences.append(_inside("start", f"starts at {rear:g} m", float(masts[start.n_spans])))
+        yield _inside("start", f"starts at {rear:g} m", float(masts[start.n_spans]))
     if isinstance(end, AbsorbingLayer) and train.end > masts[n - end.n_spans]:
-        sentences.append(_inside("end", f"runs to {train.end:g} m", float(masts[n - end.n_spans])))
-    return sentences
+        yield _inside("end", f"runs to {train.end:g} m", float(masts[n - end.n_spans]))
 
 
 def _inside(side: str, how: str, inner: float) -> str:
@@ -234,46 +274,23 @@ def _of_end(end: EndCondition) -> str:
     return "fixed"
 
 
-class Traced(NamedTuple):
-    """A line for waves, the course of each pantograph, what reaches it, and how it is called."""
-
-    line: WaveLine
-    courses: tuple[Course, ...]
-    found: tuple[Arrivals, ...]
-    names: tuple[str, ...]
-
-
 def arrival_facts(scene: Scene, problem: Problem) -> dict[str, Any]:
     """Facts in SI units, sentences about each pantograph, and warnings; plain enough for JSON.
 
     Not collective.
     """
-    traced = _traced(problem)
-    rows = zip(traced.names, traced.found, traced.courses, strict=True)
+    line = wave_line(problem)
+    courses = _courses(line, problem)
     return {
-        "wave_speed_m_per_s": traced.line.speed,
-        "fastest_wave_m_per_s": traced.line.fastest,
-        "pantographs": [
-            {
-                "start_m": course.start,
-                "run_in_m": found.run_in,
-                "run_in_spans": found.run_in_spans,
-                "start_share_of_std": found.start_share,
-                "far_end_met_at_m": None if found.far_end is None else found.far_end.at,
-                "far_end_met_at_s": None if found.far_end is None else found.far_end.time,
-                "far_end_share": found.far_share,
-                "near_end_met_at_m": None if found.near_end is None else found.near_end.at,
-                "near_end_met_at_s": None if found.near_end is None else found.near_end.time,
-                "says": _sentence(name, found),
-            }
-            for name, found, course in rows
-        ],
+        "wave_speed_m_per_s": line.speed,
+        "fastest_wave_m_per_s": line.fastest,
+        "pantographs": [course.facts() for course in courses],
         "ends": list(end_sentences(problem)),
         "warnings": [
             *_end_warnings(problem),
-            *_reflections(scene, traced),
-            *_short_run_in(problem, traced),
-            *_short_stretch(problem, traced),
+            *_reflections(scene, courses),
+            *_short_run_in(problem.line.running_range[0], courses),
+            *_short_stretch(line, problem.evaluation),
         ],
     }
 
@@ -323,56 +340,27 @@ def _bending(line: Line, wire: Wire) -> float:
     return wire.bending_stiffness if bends(slowest, wire.tension, wire.mass_per_length) else 0.0
 
 
-def _traced(problem: Problem) -> Traced:
-    line, train = wave_line(problem), problem.train
+def _courses(line: WaveLine, problem: Problem) -> list[Course]:
+    """The course of each pantograph of a problem."""
+    train, window = problem.train, problem.window
     starts = [train.start - place.behind for place in train.placements]
-    duration = (train.end - train.start) / train.speed
-    courses = tuple(
+    lets_out = [isinstance(kind, AbsorbingLayer | Periodic) for kind in problem.ends]
+    moves = window.moves and not window.by_motion > 0.0
+    return [
         Course(
+            line,
             start,
-            start + train.speed * duration,
+            start + train.end - train.start,
             train.speed,
             problem.evaluation,
             max(starts),
             min(starts),
+            (lets_out[0], lets_out[1]),
+            (window.spans_behind * line.span, window.spans_ahead * line.span) if moves else None,
+            name,
         )
-        for start in starts
-    )
-    found = tuple(
-        _in_window(_without_let_out(arrivals(line, course), problem.ends), line, course, problem)
-        for course in courses
-    )
-    return Traced(line, courses, found, tuple(places_on_train(len(starts))))
-
-
-def _without_let_out(found: Arrivals, ends: tuple[EndCondition, EndCondition]) -> Arrivals:
-    """Drop waves from ends that let them out."""
-    start, end = (isinstance(kind, AbsorbingLayer | Periodic) for kind in ends)
-    if start:
-        found = found._replace(near_end=None)
-    return found._replace(far_end=None, far_share=0.0) if end else found
-
-
-def _in_window(found: Arrivals, line: WaveLine, course: Course, problem: Problem) -> Arrivals:
-    """Drop waves that the ends of the line do not reflect, as they lie outside of a
-    window of so many spans; what the window's own ends send back is in its error."""
-    window = problem.window
-    if not window.moves or window.by_motion > 0.0:
-        return found
-    if course.rear - window.spans_behind * line.span >= line.start:
-        found = found._replace(near_end=None)
-    if found.far_end is None:
-        return found
-    # Place of this pantograph when the window reaches the far end, and where it meets what is then
-    # reflected there.
-    leader_then = line.end - window.spans_ahead * line.span
-    here = leader_then - (course.leader - course.start)
-    met = here + course.speed * (line.end - here) / (course.speed + line.fastest)
-    if met <= found.far_end.at:
-        return found
-    if met > course.end:
-        return found._replace(far_end=None, far_share=0.0)
-    return found._replace(far_end=Meeting(met, (met - course.start) / course.speed))
+        for start, name in zip(starts, places_on_train(len(starts)), strict=True)
+    ]
 
 
 def _hardware(line: Line) -> float:
@@ -393,87 +381,56 @@ def _span(line: Line) -> float:
     return (last - first) / n if n else sum(line.span_lengths) / line.n_spans
 
 
-def _sentence(name: str, found: Arrivals) -> str:
-    ends = []
-    for what, met in (("far", found.far_end), ("near", found.near_end)):
-        ends.append(
-            f"from the {what} end at {met.at:.0f} m ({met.time:.1f} s)"
-            if met is not None
-            else f"from the {what} end not before the run ends"
-        )
-    return (
-        f"{name}: {found.run_in:.0f} m or {found.run_in_spans:.1f} spans from start to evaluated "
-        f"stretch, where start-up still affects the force by about {100 * found.start_share:.2g} % "
-        f"of sigma; reflections reach the pantograph {' and '.join(ends)}"
-    )
-
-
-def _reflections(scene: Scene, traced: Traced) -> list[str]:
-    felt = [
-        i
-        for i, course in enumerate(traced.courses)
-        if (far := traced.found[i].far_end) is not None
-        and far.at < course.stretch[1]
-        and reflection_felt(traced.line, course)
-    ]
+def _reflections(scene: Scene, courses: Sequence[Course]) -> Iterator[str]:
+    felt = [course for course in courses if course.feels_reflection]
     if not felt:
-        return []
-    ends = [end_for(traced.line, traced.courses[i]) for i in felt]
+        return
+    line = felt[0].line
     # 1 mm for the rounding of sums.
-    more = math.ceil((max(ends) - traced.line.end - 1e-3) / traced.line.span)
+    more = math.ceil((max(course.least_end for course in felt) - line.end - 1e-3) / line.span)
     wanted = scene.line.n_spans + max(more, 1)
     in_file = "line.span_m" in dict(scene.origin.taken_in)
     longer = f"a line.spans_file of {wanted} spans" if in_file else f"line.n_spans = {wanted}"
-    sentences = []
-    for i in felt:
-        met = traced.found[i].far_end
-        assert met is not None  # a stretch lies within the run
-        share = traced.found[i].far_share
+    for course in felt:
+        met, (first, last) = course.far_end, course.stretch
+        assert met is not None  # it is felt
+        share = course.far_share
         left = "" if share > 0.9 else f", with up to {100 * share:.2g} % of its amplitude"
-        first, last = traced.courses[i].stretch
-        fits = met.at - first >= traced.line.span
+        fits = met.at - first >= line.span
         shorter = f", or evaluation.to_m = {math.floor(met.at):g} at most" if fits else ""
-        sentences.append(
-            f"The reflection from the end of the line reaches {in_sentence(traced.names[i])} at "
+        yield (
+            f"The reflection from the end of the line reaches {in_sentence(course.name)} at "
             f"{met.at:.0f} m ({met.time:.1f} s){left}, before the evaluated stretch ends "
             f"({first:g} to {last:g} m): its force is not that of a long line. Take {longer}"
             f"{shorter}."
         )
-    return sentences
 
 
-def _short_run_in(problem: Problem, traced: Traced) -> list[str]:
-    speed, line = problem.train.speed, traced.line
-    short = [i for i, found in enumerate(traced.found) if found.start_share > SHORT_RUN_IN]
-    if not short:
-        return []
-    needed = run_in_for(line, speed)
-    leader = max(course.leader for course in traced.courses)
-    first = problem.line.running_range[0]
-    sentences = []
-    for i in short:
-        course, found = traced.courses[i], traced.found[i]
+def _short_run_in(first: float, courses: Sequence[Course]) -> Iterator[str]:
+    """Sentences on run-ins that are too short; running spans begin at ``first`` [m]."""
+    for course in courses:
+        if course.start_share <= SHORT_RUN_IN:
+            continue
+        needed = run_in_for(course.line, course.speed)
         # To a metre, on the safe side.
-        start = math.floor(course.stretch[0] - needed + leader - course.start)
+        start = math.floor(course.stretch[0] - needed + course.leader - course.start)
         begin = math.ceil(course.start + needed)
-        fits = start - (leader - course.rear) >= first
+        fits = start - (course.leader - course.rear) >= first
         remedy = f"train.start_m = {start:g} at most, or " if fits else ""
-        sentences.append(
-            f"{capital(in_sentence(traced.names[i]))} starts {found.run_in:.0f} m, "
-            f"{found.run_in_spans:.1f} spans, before the evaluated stretch: start-up still affects "
-            f"its force by about {100 * found.start_share:.0f} % of sigma, where "
+        yield (
+            f"{capital(in_sentence(course.name))} starts {course.run_in:.0f} m, "
+            f"{course.run_in_spans:.1f} spans, before the evaluated stretch: start-up still "
+            f"affects its force by about {100 * course.start_share:.0f} % of sigma, where "
             f"{100 * SHORT_RUN_IN:.0f} % is the limit. Take {remedy}evaluation.from_m = {begin:g} "
             "at least."
         )
-    return sentences
 
 
-def _short_stretch(problem: Problem, traced: Traced) -> list[str]:
-    first, last = problem.evaluation
-    if last - first >= traced.line.span * (1.0 - 1e-9):
-        return []
-    return [
-        f"The evaluated stretch of {last - first:g} m is shorter than a span ({traced.line.span:g} "
-        "m): its statistics leave out what the rest of a span does, and no criterion that they "
-        f"pass says much. Take evaluation.to_m = {first + math.ceil(traced.line.span):g} at least."
-    ]
+def _short_stretch(line: WaveLine, stretch: tuple[float, float]) -> Iterator[str]:
+    first, last = stretch
+    if last - first < line.span * (1.0 - 1e-9):
+        yield (
+            f"The evaluated stretch of {last - first:g} m is shorter than a span ({line.span:g} "
+            "m): its statistics leave out what the rest of a span does, and no criterion that they "
+            f"pass says much. Take evaluation.to_m = {first + math.ceil(line.span):g} at least."
+        )

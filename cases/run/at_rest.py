@@ -1,17 +1,19 @@
-"""The line of a scene at rest, without a march: its tables, whether it is valid, temperatures.
+"""The line of a scene at rest: its tables, whether it is valid, temperatures, and for later steps.
 
 Tables hold heights, droppers, registration and elasticity; those over temperatures tensions, ends
-that move, and limits that the line keeps.
+that move, and limits that the line keeps. A prepared line is stepped from outside, such as from C.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+import catenary.solver.kernels
 from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.run.arrivals import arrival_facts
@@ -28,11 +30,14 @@ from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.registration import Registration
 from catenary.postproc.report.study_table import json_text
 from catenary.solver.effects.all_effects import with_defects
+from catenary.solver.effects.effect import Limit
 from catenary.solver.model.axial_motion import at_stop, tensioned_ends
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium
+from catenary.solver.problem.problem import slowest_wave_speed
 from catenary.solver.statics.form_finding import lengths_to_cut
 from catenary.solver.statics.line_at_rest import (
+    LineAtRest,
     LineAtTemperature,
     WireAtRest,
     line_at_rest,
@@ -41,6 +46,9 @@ from catenary.solver.statics.line_at_rest import (
     stable_form,
 )
 
+_KERNELS = Path(catenary.solver.kernels.__path__[0])
+# Header and library of C programs.
+HEADER, LIBRARY = _KERNELS / "simulation/catenary.h", _KERNELS / "libcatenary.so"
 # Limits of the change of tension: share, of what, and who states it.
 _LIMITS = (
     (0.10, "largest", "10 % of TB 10009-2016, 5.4.7"),
@@ -59,6 +67,18 @@ _NEEDED = ("axial_motion", "temperature")
 DROPPER_COLUMNS = ("dropper_span", "dropper_x", "dropper_length", "dropper_force")
 DROPPER_WIRES = ("dropper_upper", "dropper_lower")
 _DROPPER_HEADS = ("span", "x_m", "length_m", "force_N", "from_wire", "to_wire")
+
+
+def rest_of(scene: Scene) -> LineAtRest:
+    """The line of a scene at rest. Not collective."""
+    return line_at_rest(problem_of(scene), mesh_of(scene))
+
+
+def sound_rest(scene: Scene) -> LineAtRest:
+    """The line of a scene at rest; InputError if a wire has lost its tension. Not collective."""
+    found = rest_of(scene)
+    refuse_lost_wire(found.model, found.form)
+    return found
 
 
 class Checked(NamedTuple):
@@ -301,3 +321,24 @@ def _limit_remarks(rests: Sequence[LineAtTemperature]) -> Iterator[str]:
                     f"{name}: at {warmer:+g} K the tension changes by {100 * value:.1f} %"
                     f"{_WHERE[what]}, more than {source}"
                 )
+
+
+def prepare_line(scene: Scene, path: Path) -> int:
+    """Write the line of a scene with its train at rest; for how many steps. Not collective.
+
+    Raises
+    ------
+    InputError
+        If the line is impossible, or its steps need what a prepared line has not.
+    RunBroken
+        If the file cannot be written.
+    """
+    from catenary.base.mpi import MPI
+    from catenary.solver.time_loop.march import March  # loads PETSc
+    from catenary.solver.time_loop.prepared_line import write_line
+
+    at_rest = sound_rest(scene)
+    slower = scene.holds(Limit.WAVE_SPEED)
+    below = slowest_wave_speed(at_rest.problem) if slower else inf
+    with March(MPI.COMM_SELF, *at_rest) as march:
+        return write_line(march, path, below)

@@ -203,10 +203,7 @@ def _refusal(result: Path, what: str) -> InputError:
 
 
 def extended_scene(
-    config: dict[str, Any],
-    file: str,
-    until: float | None,
-    evaluated: str | None,
+    config: dict[str, Any], file: str, until: float | None, evaluated: str | None
 ) -> Scene:
     """The checked scene of a run with a later end, or another evaluated stretch. Not collective.
 

@@ -224,18 +224,16 @@ def incident_facts(scene: Scene, problem: Problem) -> list[dict[str, Any]]:
 
     Not collective.
     """
-    dt = problem.numerics.dt
     found = [
         {
             "type": table.type,
-            "time_s": at_step(table.at_s, dt),
-            **_incident_place(table, problem.line),
-            "says": _incident(table, problem),
+            "time_s": at_step(table.at_s, problem.numerics.dt),
+            **_incident(table, problem),
         }
         for table in scene.incidents
         if table.type in problem.effects
     ]
-    return sorted(found, key=lambda fact: float(str(fact["time_s"])))
+    return sorted(found, key=lambda fact: float(fact["time_s"]))
 
 
 def _dropper_of_span(line: Line, span: int, number: int) -> tuple[dict[str, float], str]:
@@ -244,24 +242,19 @@ def _dropper_of_span(line: Line, span: int, number: int) -> tuple[dict[str, floa
     return {"at_m": x, "nth": nth}, f"dropper {number} of span {span}, at {x:g} m"
 
 
-def _incident_place(table: Incident, line: Line) -> dict[str, float]:
-    if not isinstance(table, DropperBreakTable):
-        return {}
-    return _dropper_of_span(line, table.span, table.dropper)[0]
-
-
-def _incident(table: Incident, problem: Problem) -> str:
-    line = problem.line
-    if isinstance(table, DropperBreakTable):
-        return f"{_dropper_of_span(line, table.span, table.dropper)[1]}, breaks"
-    if isinstance(table, TensionLossTable):
-        left = table.share * line.wire(table.wire).tension / 1e3
-        name = wire_words(table.wire)
-        return f"the tension of the {name} falls to {left:.4g} kN, {table.share:g} of what it was"
-    return (
-        f"pantograph {table.pantograph} is lowered: its static force goes over to "
-        f"{table.force_N:g} N within {table.within_s:g} s; {_fall(table, problem)}"
-    )
+def _incident(table: Incident, problem: Problem) -> dict[str, Any]:
+    match table:
+        case DropperBreakTable():
+            at, which = _dropper_of_span(problem.line, table.span, table.dropper)
+            return {**at, "says": f"{which}, breaks"}
+        case TensionLossTable():
+            left = f"{table.share * problem.line.wire(table.wire).tension / 1e3:.4g} kN"
+            falls = f"falls to {left}, {table.share:g} of what it was"
+            return {"says": f"the tension of the {wire_words(table.wire)} {falls}"}
+        case LoweringTable():
+            says = f"pantograph {table.pantograph} is lowered: its static force goes over to "
+            says += f"{table.force_N:g} N within {table.within_s:g} s; {_fall(table, problem)}"
+            return {"says": says}
 
 
 def _fall(table: LoweringTable, problem: Problem) -> str:

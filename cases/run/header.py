@@ -40,10 +40,7 @@ def scene_attributes(scene: Scene, problem: Problem) -> dict[str, Any]:
 
 def train_attributes(scene: Scene, problem: Problem) -> dict[str, Any]:
     """Attributes of a line that a train excites. Not collective."""
-    return {
-        "pantographs": header_words(scene, problem),
-        "arrivals": arrival_facts(scene, problem),
-    }
+    return {"pantographs": header_words(scene, problem), "arrivals": arrival_facts(scene, problem)}
 
 
 def header_of(
@@ -86,8 +83,6 @@ def header_of(
         },
         # Of the wires as they hang, worn and with wrong tensions.
         facts=facts_of(
-            replace(problem, line=at_rest.problem.line),
-            at_rest.mesh,
-            at_rest.model.dropper_lengths,
+            replace(problem, line=at_rest.problem.line), at_rest.mesh, at_rest.model.dropper_lengths
         ),
     )

@@ -13,11 +13,7 @@ from catenary.base.errors import InputError
 from catenary.base.files import is_file
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.case_files import REMOVED
-from catenary.cases.scene.input.csv_files import (
-    DROPPER_COLUMNS,
-    LEAST_PRE_SAG,
-    dropper_table,
-)
+from catenary.cases.scene.input.csv_files import DROPPER_COLUMNS, LEAST_PRE_SAG, dropper_table
 from catenary.cases.scene.load import read_draft
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.scene.starter import DROPPERS_FILE

@@ -157,13 +157,14 @@ def run_case(
     allowed = force if large is None else large
 
     def run(ranks: Any) -> RunOutcome:
-        order = _Order(
-            *(scene, out_dir, ranks, petsc_options, on_closed, None, only_summary, ready),
-            excited=excited,
-        )
         with held(out_dir, ranks, f"catenary run {scene.case.name}"):
             on_root(ranks, lambda: prepare(out_dir, force))
-            return _run(order, lambda size: check_size(out_dir, size, allowed))
+            return _Run(
+                *(scene, out_dir, ranks, lambda size: check_size(out_dir, size, allowed)),
+                *(petsc_options, on_closed, only_summary),
+                ready=ready,
+                excited=excited,
+            ).make()
 
     return _on_as_many(scene, comm, run)
 
@@ -197,11 +198,12 @@ def restart_case(
     def go_on(ranks: Any) -> RunOutcome:
         with held(out_dir, ranks, f"catenary restart {out_dir}"):
             state = on_root(ranks, lambda: state_to_continue(out_dir / RUN_FILE, extends))
-            order = _Order(
-                *(scene, out_dir, ranks, petsc_options, on_closed, state, only_summary),
+            return _Run(
+                *(scene, out_dir, ranks, lambda size: check_room_to_continue(out_dir, size, force)),
+                *(petsc_options, on_closed, only_summary),
+                state=state,
                 extends=extends,
-            )
-            return _run(order, lambda size: check_room_to_continue(out_dir, size, force))
+            ).make()
 
     return _on_as_many(scene, comm, go_on)
 
@@ -232,188 +234,220 @@ def _warn_of_idle(mode: str, n_idle: int) -> None:
     )
 
 
-@dataclass(frozen=True)
-class _Order:
-    """A run that is wanted: the arguments of ``run_case``, and the state that it continues from."""
+@dataclass
+class _Run:
+    """A run that is wanted in a folder that is ready: the arguments of ``run_case``, and the state
+    that it continues from. ``judge`` sees its size on rank 0 before the mesh is made, or once that
+    is read."""
 
     scene: Scene
     out_dir: Path
     comm: Any
+    judge: Callable[[RunSize], None]
     petsc_options: Sequence[str]
     on_closed: Callable[[str], None]
-    state: dict[str, Any] | None
     only_summary: bool
     ready: Callable[[], None] = lambda: None
+    state: dict[str, Any] | None = None
     extends: bool = False
     excited: ExcitedRun | None = None
+    problem: Problem = field(init=False)
 
-    @property
-    def resume(self) -> bool:
-        """Whether it continues another run."""
-        return self.state is not None
+    def __post_init__(self) -> None:
+        self.result = self.out_dir / RUN_FILE
+        self.phases = Phases(Progress(self.comm))
 
-    @property
-    def result(self) -> Path:
-        """The result file."""
-        return self.out_dir / RUN_FILE
+    def make(self) -> RunOutcome:
+        """All phases. Collective."""
+        outcome, n_unknowns = self._march()
+        # The line is not needed any more: of a long one it is a gigabyte.
+        give_back(n_unknowns)
+        self.on_closed(outcome.outcome)
+        with self.phases("report"):
+            result = self._report(outcome)
+        wall = result.phase_wall = dict(self.phases.wall)
+        logger.debug("phases [s]: %s", {name: round(own, 3) for name, own in wall.items()})
+        return result
 
+    def _march(self) -> tuple[Outcome, int]:
+        """End of the march, after which the result file is closed, and number of unknowns that the
+        line had. Collective."""
+        comm, phases, resume = self.comm, self.phases, self.state is not None
+        left = f"{self.result} is as it was" if resume else "nothing was written"
+        with ExitStack() as stack:
+            with Phase(comm, "the line was read", left) as phase:
+                excited = self.excited
+                self.problem = problem_of(self.scene) if excited is None else excited.problem
+                on_root(comm, phase.alone(self._judge_before_meshing))
+                self.ready()
+                at_rest = self._find_rest(phase)
+                if excited is not None:
+                    excited.excite(at_rest)
+                else:
+                    on_root(comm, lambda: refuse_lost_wire(at_rest.model, at_rest.form))
+                header: Header | None = None
+                if comm.rank == 0:
+                    options = self.petsc_options
+                    header = header_of(self.scene, self.problem, at_rest, options, excited)
+                if resume:
+                    on_root(comm, lambda: self._refuse_other_run(header, at_rest))
+                phase.next("the solver was prepared")
+                with phases("prepare solver"):
+                    march = stack.enter_context(March(comm, *at_rest))
+                    if self.state is not None:
+                        march.restore(self.state)
+                    if self.extends:
+                        on_root(comm, lambda: self._extend(header, march.n_steps), takes_long=True)
+                observers, recorder, watch = self._observers(at_rest, header, march.n_steps)
+                header = None  # the recorder has it until it has written it
+            give_back(at_rest.model.n_unknowns)
+            with StopRequest() as stop:
+                with phases("march"):
+                    outcome = march.run(observers, stop)
+                recorder.close(
+                    {**performance(outcome, phases, comm.size), "watched": watch.facts()}
+                )
+        if not recorder.begun:
+            raise RunBroken(outcome.outcome)
+        return outcome, at_rest.model.n_unknowns
 
-def _run(order: _Order, judge: Callable[[RunSize], None]) -> RunOutcome:
-    """All phases of a run whose folder is ready. Collective.
+    def _judge_before_meshing(self) -> None:
+        needs = needs_before_meshing(self.scene, self.problem)
+        if needs is not None:
+            self.judge(run_size(needs))
 
-    ``judge`` sees the size of the run on rank 0 before the mesh is made, or once it is read.
-    """
-    phases = Phases(Progress(order.comm))
-    outcome, n_unknowns = _marched(order, judge, phases)
-    # The line is not needed any more: of a long one it is a gigabyte.
-    give_back(n_unknowns)
-    order.on_closed(outcome.outcome)
-    with phases("report"):
-        result = _reported(order, outcome)
-    result.phase_wall = dict(phases.wall)
-    logger.debug("phases [s]: %s", {name: round(wall, 3) for name, wall in phases.wall.items()})
-    return result
+    def _find_rest(self, phase: Phase) -> LineAtRest:
+        """Mesh and equilibrium, found on rank 0 and given to all. Collective."""
 
+        def make_mesh() -> LineMesh:
+            mesh = mesh_of(self.scene)
+            if self.scene.mesh.file is not None:
+                self.judge(run_size(needs_with_mesh(self.scene, mesh)))
+            return mesh
 
-def _marched(
-    order: _Order, judge: Callable[[RunSize], None], phases: Phases
-) -> tuple[Outcome, int]:
-    """End of the march, after which the result file is closed, and number of unknowns that the line
-    had. Collective."""
-    scene, comm = order.scene, order.comm
-    left = f"{order.result} is as it was" if order.resume else "nothing was written"
-    with ExitStack() as stack:
-        with Phase(comm, "the line was read", left) as phase:
-            excited = order.excited
-            problem = problem_of(scene) if excited is None else excited.problem
-            on_root(comm, phase.alone(lambda: _judge_before_meshing(scene, problem, judge)))
-            order.ready()
-            at_rest = _at_rest(scene, problem, comm, phases, phase, judge)
-            if excited is not None:
-                excited.excite(at_rest)
-            else:
-                on_root(comm, lambda: refuse_lost_wire(at_rest.model, at_rest.form))
-            header: Header | None = None
-            if comm.rank == 0:
-                header = header_of(scene, problem, at_rest, order.petsc_options, excited)
-            if order.resume:
-                on_root(comm, lambda: _refuse_other_run(order, header, problem, at_rest))
-            phase.next("the solver was prepared")
-            with phases("prepare solver"):
-                march = stack.enter_context(March(comm, *at_rest))
-                if order.state is not None:
-                    march.restore(order.state)
-                if order.extends:
-                    on_root(
-                        comm, lambda: _extend_run(order, header, march.n_steps), takes_long=True
-                    )
-            observers, recorder, watch = _observers(
-                order, problem, at_rest, header, phases.progress, march.n_steps
-            )
-            header = None  # the recorder has it until it has written it
-        give_back(at_rest.model.n_unknowns)
-        with StopRequest() as stop:
-            with phases("march"):
-                outcome = march.run(observers, stop)
-            recorder.close({**performance(outcome, phases, comm.size), "watched": watch.facts()})
-    if not recorder.begun:
-        raise RunBroken(outcome.outcome)
-    return outcome, at_rest.model.n_unknowns
+        phase.next("the mesh was made")
+        with self.phases("mesh"):
+            mesh: LineMesh = on_root(self.comm, phase.alone(make_mesh), takes_long=True)
+        phase.next("the equilibrium was found")
+        with self.phases("equilibrium"):
+            return line_at_rest_on_all(self.problem, mesh, self.comm, phase.alone)
 
+    def _observers(
+        self, at_rest: LineAtRest, header: Header | None, n_steps: int
+    ) -> tuple[list[Observer], Recorder, RunWatch]:
+        """Observers of the march, the recorder last, and the one that judges it. Not collective.
 
-def _judge_before_meshing(scene: Scene, problem: Problem, judge: Callable[[RunSize], None]) -> None:
-    needs = needs_before_meshing(scene, problem)
-    if needs is not None:
-        judge(run_size(needs))
-
-
-def _at_rest(
-    scene: Scene,
-    problem: Problem,
-    comm: Any,
-    phases: Phases,
-    phase: Phase,
-    judge: Callable[[RunSize], None],
-) -> LineAtRest:
-    """Mesh and equilibrium, found on rank 0 and given to all. Collective."""
-
-    def make_mesh() -> LineMesh:
-        mesh = mesh_of(scene)
-        if scene.mesh.file is not None:
-            judge(run_size(needs_with_mesh(scene, mesh)))
-        return mesh
-
-    phase.next("the mesh was made")
-    with phases("mesh"):
-        mesh: LineMesh = on_root(comm, phase.alone(make_mesh), takes_long=True)
-    phase.next("the equilibrium was found")
-    with phases("equilibrium"):
-        return line_at_rest_on_all(problem, mesh, comm, phase.alone)
-
-
-def _observers(
-    order: _Order,
-    problem: Problem,
-    at_rest: LineAtRest,
-    header: Header | None,
-    progress: Progress,
-    n_steps: int,
-) -> tuple[list[Observer], Recorder, RunWatch]:
-    """Observers of the march, the recorder last, and the one that judges it. Not collective.
-
-    The state to continue from, which the recorder writes, stands for all before it. ``n_steps`` are
-    those of the whole run, ``header`` is needed on rank 0.
-    """
-    comm, dt, output = order.comm, problem.numerics.dt, order.scene.output
-    begun_for = comm.bcast(_begun_for(order) if comm.rank == 0 else None) or n_steps
-    excited = order.excited
-    usual = FIELD_EVERY if excited is None else excited.snapshot_every
-    extent, with_train = extent_of(at_rest.mesh), excited is None
-    recording = recording_of(output, problem, extent, begun_for, usual, with_train)
-    for sentence in recording.thinned(dt):
-        logger.info(sentence)
-    flush_every = output.flush_every_steps or flush_cadence(
-        problem, at_rest.model.n_unknowns, recording
-    )
-    fields: FieldRecorder | None = None
-    if recording.field_every:
-        fields = FieldRecorder(
-            comm,
-            order.out_dir / "fields.xdmf",
-            RecordedLine(
-                at_rest.problem.line, at_rest.mesh, at_rest.form.slope, at_rest.form.lateral
-            ),
-            every=recording.field_every,
-            record=recording.fields,
-            flush_every=flush_every,
-            resume=order.resume,
-            wait=True,
+        The state to continue from, which the recorder writes, stands for all before it. ``n_steps``
+        are those of the whole run, ``header`` is needed on rank 0.
+        """
+        comm, dt, output = self.comm, self.problem.numerics.dt, self.scene.output
+        begun_for = comm.bcast(self._begun_for() if comm.rank == 0 else None) or n_steps
+        excited, resume = self.excited, self.state is not None
+        usual = FIELD_EVERY if excited is None else excited.snapshot_every
+        extent, with_train = extent_of(at_rest.mesh), excited is None
+        recording = recording_of(output, self.problem, extent, begun_for, usual, with_train)
+        for sentence in recording.thinned(dt):
+            logger.info(sentence)
+        flush_every = output.flush_every_steps or flush_cadence(
+            self.problem, at_rest.model.n_unknowns, recording
         )
+        fields: FieldRecorder | None = None
+        if recording.field_every:
+            fields = FieldRecorder(
+                comm,
+                self.out_dir / "fields.xdmf",
+                RecordedLine(
+                    at_rest.problem.line, at_rest.mesh, at_rest.form.slope, at_rest.form.lateral
+                ),
+                every=recording.field_every,
+                record=recording.fields,
+                flush_every=flush_every,
+                resume=resume,
+                wait=True,
+            )
 
-    def begun() -> None:
-        remove_stale(order.out_dir)
-        if fields is not None:
-            fields.publish()
+        def begun() -> None:
+            remove_stale(self.out_dir)
+            if fields is not None:
+                fields.publish()
 
-    recorder = Recorder(
-        comm,
-        order.result,
-        header,
-        flush_every=flush_every,
-        energy_every=recording.energy_every,
-        record=recording.line,
-        resume=order.resume,
-        on_begun=begun,
-        force_filter=lambda: _force_filter(dt) if with_train else None,
-    )
-    first: list[Observer] = [] if fields is None else [fields]
-    half_lengths = [place.data.strips.half_length for place in problem.train.placements]
-    if "lateral_motion" in problem.effects and np.isfinite(half_lengths).any():
-        first.append(StripWatch(half_lengths))
-    if excited is not None:
-        first += excited.watching(at_rest)
-    watch = RunWatch(comm, at_rest, excited is None)
-    return [*first, progress, watch, recorder], recorder, watch
+        recorder = Recorder(
+            comm,
+            self.result,
+            header,
+            flush_every=flush_every,
+            energy_every=recording.energy_every,
+            record=recording.line,
+            resume=resume,
+            on_begun=begun,
+            force_filter=lambda: _force_filter(dt) if with_train else None,
+        )
+        observers: list[Observer] = [] if fields is None else [fields]
+        half_lengths = [place.data.strips.half_length for place in self.problem.train.placements]
+        if "lateral_motion" in self.problem.effects and np.isfinite(half_lengths).any():
+            observers.append(StripWatch(half_lengths))
+        if excited is not None:
+            observers += excited.watching(at_rest)
+        watch = RunWatch(comm, at_rest, excited is None)
+        return [*observers, self.phases.progress, watch, recorder], recorder, watch
+
+    def _refuse_other_run(self, header: Header | None, at_rest: LineAtRest) -> None:
+        from catenary.cases.run.continuing import refuse_other_run, refuse_other_state
+
+        assert header is not None and self.state is not None
+        n_strips = tuple(len(place.data.strips.offsets) for place in self.problem.train.placements)
+        refuse_other_run(self.result, header, n_strips, CHANGED if self.extends else ())
+        refuse_other_state(self.result, self.state, at_rest.model)
+
+    def _extend(self, header: Header | None, n_steps: int) -> None:
+        assert header is not None
+        extend_run(self.result, header, n_steps)
+
+    def _begun_for(self) -> int | None:
+        """Steps for which a run was begun that got a later end, None if it did not."""
+        if self.state is None:
+            return None
+        from catenary.postproc.read.results import Results
+
+        with Results(self.result) as results:
+            return results.attributes.get(BEGUN_FOR)
+
+    def _report(self, outcome: Outcome) -> RunOutcome:
+        """Write the report on rank 0. Collective.
+
+        After an interruption the next signal ends the process, before one it leaves a whole result.
+        """
+        again = f"`catenary report {quote(str(self.out_dir))}` writes the report again"
+
+        def work() -> RunOutcome:
+            return self._write_report(outcome, again)
+
+        if outcome.outcome != "done":
+            return on_root(self.comm, work, takes_long=True)
+        left = f"{self.result} is complete: {again}"
+        with Phase(self.comm, "the report was written", left) as phase:
+            return on_root(self.comm, phase.alone(work), takes_long=True)
+
+    def _write_report(self, outcome: Outcome, again: str) -> RunOutcome:
+        # On the rank that writes it, once the march is over: filters and pictures load for long.
+        from catenary.postproc.report.report import write_report, write_summary
+
+        try:
+            if self.only_summary:
+                write_summary(self.result, self.out_dir)
+            else:
+                write_report(self.result, self.out_dir)
+            summary = json.loads((self.out_dir / "summary.json").read_text(encoding="utf-8"))
+        except (OSError, CatenaryError) as error:
+            if outcome.outcome != "done":  # reported already
+                return RunOutcome(outcome.outcome)
+            if not os.path.lexists(self.result):
+                raise RunBroken(
+                    f"{self.result} was moved or removed before its report was written; where it "
+                    "is now, `catenary report` writes one"
+                ) from error
+            raise RunBroken(f"{error}; the results are complete: {again}") from error
+        return RunOutcome(outcome.outcome, summary)
 
 
 def _force_filter(dt: float) -> ForceFilter | None:
@@ -424,70 +458,3 @@ def _force_filter(dt: float) -> ForceFilter | None:
     if 2.0 * filters.CUT_OFF * dt >= 1.0:
         return None
     return ForceFilter(filters.ABOUT, filters.low_pass)
-
-
-def _reported(order: _Order, outcome: Outcome) -> RunOutcome:
-    """Write the report on rank 0. Collective.
-
-    After an interruption the next signal ends the process, before one it leaves a whole result.
-    """
-
-    def work() -> RunOutcome:
-        return _report(order.out_dir, outcome, order.only_summary)
-
-    if outcome.outcome != "done":
-        return on_root(order.comm, work, takes_long=True)
-    again = f"`catenary report {quote(str(order.out_dir))}` writes the report again"
-    left = f"{order.result} is complete: {again}"
-    with Phase(order.comm, "the report was written", left) as phase:
-        return on_root(order.comm, phase.alone(work), takes_long=True)
-
-
-def _report(out_dir: Path, outcome: Outcome, only_summary: bool) -> RunOutcome:
-    # On the rank that writes it, once the march is over: filters and pictures load for long.
-    from catenary.postproc.report.report import write_report, write_summary
-
-    try:
-        if only_summary:
-            write_summary(out_dir / RUN_FILE, out_dir)
-        else:
-            write_report(out_dir / RUN_FILE, out_dir)
-        summary = json.loads((out_dir / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, CatenaryError) as error:
-        if outcome.outcome != "done":  # reported already
-            return RunOutcome(outcome.outcome)
-        if not os.path.lexists(out_dir / RUN_FILE):
-            raise RunBroken(
-                f"{out_dir / RUN_FILE} was moved or removed before its report was written; where "
-                "it is now, `catenary report` writes one"
-            ) from error
-        again = f"`catenary report {quote(str(out_dir))}` writes the report again"
-        raise RunBroken(f"{error}; the results are complete: {again}") from error
-    return RunOutcome(outcome.outcome, summary)
-
-
-def _refuse_other_run(
-    order: _Order, header: Header | None, problem: Problem, at_rest: LineAtRest
-) -> None:
-    from catenary.cases.run.continuing import refuse_other_run, refuse_other_state
-
-    assert header is not None and order.state is not None
-    n_strips = tuple(len(place.data.strips.offsets) for place in problem.train.placements)
-    refuse_other_run(order.result, header, n_strips, CHANGED if order.extends else ())
-    refuse_other_state(order.result, order.state, at_rest.model)
-
-
-def _extend_run(order: _Order, header: Header | None, n_steps: int) -> None:
-
-    assert header is not None
-    extend_run(order.result, header, n_steps)
-
-
-def _begun_for(order: _Order) -> int | None:
-    """Steps for which a run was begun that got a later end, None if it did not."""
-    if not order.resume:
-        return None
-    from catenary.postproc.read.results import Results
-
-    with Results(order.result) as results:
-        return results.attributes.get(BEGUN_FOR)

@@ -21,7 +21,7 @@ import numpy as np
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.mpi import MPI
 from catenary.cases.process.interrupts import Phase
-from catenary.cases.run.prepared import rest_of
+from catenary.cases.run.at_rest import rest_of
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
 from catenary.cases.scene.input.case_files import Assigned
 from catenary.cases.scene.input.faults import shown_word

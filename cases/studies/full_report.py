@@ -644,11 +644,11 @@ def _waves_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     from catenary.cases.studies.waves import pictures
     from catenary.cases.studies.waves.seen import waves_seen
     from catenary.cases.studies.waves.theory import wave_theory
-    from catenary.postproc.film.film_data import Snapshots, film_data
+    from catenary.postproc.film.film_data import FilmData, Snapshots
 
     heading, results = "Waves in space and time", run.results
     try:
-        data = film_data(results)
+        data = FilmData(results)
         folder, until = results.path.parent, float(data.time[-1])
         with Snapshots(folder, len(data.points), until=until) as snapshots:
             snapshots.need_whole()

@@ -23,10 +23,7 @@ from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import evaluated_force
 from catenary.postproc.read.results import Results
 from catenary.solver.model import beam
-from catenary.solver.problem.integrator_parameters import (
-    AVERAGE_ACCELERATION,
-    Integration,
-)
+from catenary.solver.problem.integrator_parameters import AVERAGE_ACCELERATION, Integration
 
 # Time over which an error of phase grows [s]: on the line without damping, where waves run
 # away from the pantograph, and at the pantograph itself, which no damping of the line shortens.

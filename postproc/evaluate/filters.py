@@ -8,7 +8,7 @@ gain is 1/2 (-6 dB), at frequency f of a low-pass 1 / (1 + (tan(pi f dt)/tan(pi 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import signal
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from catenary.postproc.read.results import Results
 
 CUT_OFF = 20.0
-# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
+# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off: the
+# slowest pole decays with sin(pi/12) 2 pi fc. By as much a record is continued at both ends.
 SETTLED = 6.0
 BAND_LIMIT = 5.0
 ORDER = 6
@@ -30,13 +31,8 @@ ABOUT = {
     "cut_off_Hz": CUT_OFF,
     "order": ORDER,
 }
-# The slowest pole of the 6th-order low-pass decays with sin(pi/12) 2 pi fc, thus to 1e-4 in
-# 5.7 / fc; the record is continued by that much at both ends before it is filtered.
-_PADDING_PERIODS = 6.0
 # Frequencies up to so many cut-offs, where the gain is 1e-7, in so many intervals a cut-off.
 _UP_TO, _INTERVALS = 4, 500
-# Rows that are filtered at once.
-_BLOCK = 1 << 16
 
 
 def check_sampling(dt: float, cut_off: float = CUT_OFF) -> None:
@@ -132,47 +128,18 @@ def power_kept(cut_off: float, dt: float | None) -> tuple[np.ndarray, np.ndarray
     return frequency, 1.0 / (1.0 + ratio ** (2 * ORDER)) ** 2
 
 
-class _Sections(NamedTuple):
-    """Second-order sections of a filter, and their state under a constant unit input."""
-
-    sos: np.ndarray
-    at_rest: np.ndarray
-
-
 @lru_cache(maxsize=64)
-def _sections(kind: str, edges: tuple[float, ...], dt: float) -> _Sections:
-    """A filter; cached, as sweeps use it in each run."""
-    sos = signal.butter(ORDER, np.squeeze(edges), btype=kind, fs=1.0 / dt, output="sos")
-    return _Sections(np.asarray(sos), signal.sosfilt_zi(sos))
+def _sections(kind: str, edges: tuple[float, ...], dt: float) -> np.ndarray:
+    """Second-order sections of a filter; cached, as sweeps use it in each run."""
+    found = signal.butter(ORDER, np.squeeze(edges), btype=kind, fs=1.0 / dt, output="sos")
+    return np.asarray(found)
 
 
-def _both_ways(one: _Sections, values: np.ndarray, dt: float, slowest: float) -> np.ndarray:
-    """Like ``scipy.signal.sosfiltfilt`` along the first axis, to the last bit.
-
-    It takes the memory of one more record, not of five: a record is filtered in place, in blocks,
-    each of which goes on from the state that the one before has left.
-    """
+def _both_ways(sections: np.ndarray, values: np.ndarray, dt: float, slowest: float) -> np.ndarray:
+    """Values filtered along the first axis, continued at both ends as they are turned about their
+    end points."""
     values = np.asarray(values, dtype=float)
-    n = values.shape[0]
-    if n == 0:
+    if not len(values):
         return values.copy()
-    padding = min(n - 1, int(np.ceil(_PADDING_PERIODS / (slowest * dt))))
-    # Continued at both ends by the record itself, turned about its end points.
-    # Columns are contiguous, as SciPy filters them.
-    extended = np.empty((*values.shape[:0:-1], n + 2 * padding)).T
-    extended[padding : padding + n] = values
-    if padding:
-        extended[:padding] = 2.0 * values[:1] - values[padding:0:-1]
-        extended[padding + n :] = 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
-    _in_place(one, extended)
-    _in_place(one, extended[::-1])
-    return extended[padding : padding + n]
-
-
-def _in_place(one: _Sections, record: np.ndarray) -> None:
-    """Filter a record along its first axis, from the steady state of its first value on."""
-    sos, at_rest = one
-    state = at_rest.reshape(*at_rest.shape, *[1] * (record.ndim - 1)) * record[:1]
-    for start in range(0, record.shape[0], _BLOCK):
-        block = record[start : start + _BLOCK]
-        block[:], state = signal.sosfilt(sos, block, axis=0, zi=state)
+    padding = min(len(values) - 1, int(np.ceil(SETTLED / (slowest * dt))))
+    return np.asarray(signal.sosfiltfilt(sections, values, axis=0, padlen=padding))

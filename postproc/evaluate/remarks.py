@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -60,178 +61,161 @@ def remarks(results: Results) -> list[str]:
         *_about_ends(results),
         *_about_stops(results),
         *_about_iterations(results),
-        *_about_sizes(results),
         *_about_gusts(results),
     ]
 
 
-def _about_excitation(results: Results) -> list[str]:
+def _about_excitation(results: Results) -> Iterator[str]:
     """Remark on a run without a train, of which nothing is judged."""
     facts = results.attributes.get("excitation")
-    if not facts:
-        return []
-    return [
-        f"The line is excited by {facts['says']}, without a train: nothing is judged, and contact "
-        "forces are zero."
-    ]
+    if facts:
+        yield (
+            f"The line is excited by {facts['says']}, without a train: nothing is judged, and "
+            "contact forces are zero."
+        )
 
 
-def _about_iterations(results: Results) -> list[str]:
-    """Remark on steps above the tolerances, where the scene has a fixed number of iterations."""
+def _about_iterations(results: Results) -> Iterator[str]:
+    """Remarks on steps above the tolerances: where the scene has a fixed number of iterations, and
+    where steps were the shortest."""
     steps = results.attributes.get("inner_iterations", {})
     above, fixed = steps.get("unconverged_steps", 0), results.fact("fixed_iterations")
-    if not above or math.isnan(fixed):
-        return []
-    return [
-        f"{above} of {steps['steps']} steps ended above the tolerances of the fixed-point "
-        f"correction, because numerics.iterations = {fixed:g} ends each: their forces and motions "
-        "are not consistent. Take more iterations, or leave the key out."
-    ]
-
-
-def _about_sizes(results: Results) -> list[str]:
-    """Remark on steps above the tolerance though they were the shortest."""
-    steps = results.attributes.get("inner_iterations", {})
+    if above and not math.isnan(fixed):
+        yield (
+            f"{above} of {steps['steps']} steps ended above the tolerances of the fixed-point "
+            f"correction, because numerics.iterations = {fixed:g} ends each: their forces and "
+            "motions are not consistent. Take more iterations, or leave the key out."
+        )
     above = steps.get("steps_above_tolerance", 0)
-    if not above:
-        return []
-    return [
-        f"{above} of {steps['steps']} steps were taken with an estimated error of the contact "
-        f"force above numerics.adaptive_tolerance_N = {results.fact('step_tolerance'):g}, being "
-        "the shortest: take a smaller numerics.smallest_dt_s, or a larger tolerance."
-    ]
+    if above:
+        yield (
+            f"{above} of {steps['steps']} steps were taken with an estimated error of the contact "
+            f"force above numerics.adaptive_tolerance_N = {results.fact('step_tolerance'):g}, "
+            "being the shortest: take a smaller numerics.smallest_dt_s, or a larger tolerance."
+        )
 
 
-def _about_gusts(results: Results) -> list[str]:
+def _about_gusts(results: Results) -> Iterator[str]:
     """Remark on strong gusts, much of whose load linear drag leaves out."""
     gust = results.fact("strongest_gust")
-    # Not of NaN either.
-    if not gust > 0.0:
-        return []
     left_out = (gust / (1.0 + gust)) ** 2
-    if left_out < _LEFT_OUT:
-        return []
-    return [
-        f"Gusts reach {gust:.2g} times the mean wind, about which their drag is linear: in those "
-        f'{1e2 * left_out:.0f} % of the load on a wire are left out. Take wind.drag = "quadratic".'
-    ]
+    if gust > 0.0 and left_out >= _LEFT_OUT:  # not of NaN either
+        yield (
+            f"Gusts reach {gust:.2g} times the mean wind, about which their drag is linear: in "
+            f"those {1e2 * left_out:.0f} % of the load on a wire are left out. Take wind.drag = "
+            '"quadratic".'
+        )
 
 
-def _about_incidents(results: Results) -> list[str]:
+def _about_incidents(results: Results) -> Iterator[str]:
     """Incidents after which a pantograph is still within the evaluated stretch."""
     found = results.attributes.get("incidents", [])
     if not found:
-        return []
+        return
     start, end = results.evaluation
     last = -1.0
     for part, position in results.blocks("contact_position"):
         evaluated = ((position >= start) & (position <= end)).any(axis=1)
         if evaluated.any():
             last = results.time_at(part.start + int(np.flatnonzero(evaluated)[-1]))
-    return [
-        f"At {fact['time_s']:.4g} s {fact['says']}. The statistics of the evaluated stretch "
-        "include its consequences: they do not describe an intact line under intact pantographs."
-        for fact in found
-        if fact["time_s"] < last
-    ]
+    for fact in found:
+        if fact["time_s"] < last:
+            yield (
+                f"At {fact['time_s']:.4g} s {fact['says']}. The statistics of the evaluated "
+                "stretch include its consequences: they do not describe an intact line under "
+                "intact pantographs."
+            )
 
 
-def _about_droppers(results: Results) -> list[str]:
+def _about_droppers(results: Results) -> Iterator[str]:
     """Remark on droppers that are stiff for the step, and the remedy."""
     stiffness, dt = results.fact("stiffest_dropper"), results.dt
     # Not of NaN either.
     if not stiffness * dt**2 > STIFF:
-        return []
+        return
     begin = f"Droppers of {stiffness_words(stiffness)} are stiff for a step of {1e3 * dt:g} ms"
     longest = f"a numerics.dt_s of {1e3 * math.sqrt(STIFF / stiffness):.2g} ms at most"
     added = results.fact("added_dropper_damping")
     if added > 0.0:
-        return [
+        yield (
             f"{begin}: numerical damping of alpha = {1e3 * added:.3g} ms in them "
             "(effects.stiff_link_damping) keeps their switches from making energy, and softens the "
             f"forces of a few steps. Take {longest} to do without."
-        ]
-    if results.fact("dropper_stiffness_damping") >= dt:
-        return []
-    return [
-        f"{begin}: when they slacken and tighten they give the line energy that it did not have. "
-        f"Take {longest}, or leave effects.stiff_link_damping on."
-    ]
+        )
+    elif not results.fact("dropper_stiffness_damping") >= dt:
+        yield (
+            f"{begin}: when they slacken and tighten they give the line energy that it did not "
+            f"have. Take {longest}, or leave effects.stiff_link_damping on."
+        )
 
 
-def _about_ends(results: Results) -> list[str]:
+def _about_ends(results: Results) -> Iterator[str]:
     """Remark on slack droppers in the span before a periodic end, beyond which none slacken."""
     periodic = [side for side in _SIDES if results.fact(f"periodic_{side}") == 1.0]
     if not periodic or not slackens_at_all(results):
-        return []
+        return
     masts, x = results.line("support_x"), results.line("dropper_x")
     lowest, (first, last) = results.extremes("dropper_force")[0], results.evaluation
-    sentences = []
     for side in periodic:
         low, high = masts[:2] if side == "start" else masts[-2:]
         slack = int(np.count_nonzero((x > low) & (x < high) & (lowest <= 0.0)))
         if slack and first < high and last > low:
-            remedy = (
-                f"take an evaluation.to_m of {low:g} at most" if side == "end"
-                else f"take an evaluation.from_m of {high:g} at least"
-            )  # fmt: skip
-            sentences.append(
+            inner = f"to_m of {low:g} at most" if side == "end" else f"from_m of {high:g} at least"
+            yield (
                 f"{counted(slack, 'dropper')} of the span at the periodic {side} of the line "
                 "slackened, which is part of the evaluated stretch; those beyond do not slacken, "
-                "and near the end the force is not that of a longer line: "
-                f"{remedy}, or a larger line.n_spans."
+                "and near the end the force is not that of a longer line: take an evaluation."
+                f"{inner}, or a larger line.n_spans."
             )
-    return sentences
 
 
-def _about_stops(results: Results) -> list[str]:
+def _about_stops(results: Results) -> Iterator[str]:
     """Remark on tensioners at their stops, at rest or under way."""
     low, high = (results.extremes(name)[1] for name in (LOW_STOP, HIGH_STOP))
     force = np.maximum(low, high)
     stopped = np.flatnonzero(force > 0.0)  # not where it is not known, NaN
-    if stopped.size == 0:
-        return []
-    most = stopped[np.argmax(force[stopped])]
-    return [
-        f"{counted(stopped.size, 'tensioner')} met a stop, the one at "
-        f"{results.line('end_x')[most]:g} m with {1e-3 * force[most]:.3g} kN the most: its wire "
-        "does not have the tension of its weights. `catenary static` prints tensions at rest; take "
-        "a larger line.tensioner.travel_m, or a shorter section."
-    ]
+    if stopped.size:
+        most = stopped[np.argmax(force[stopped])]
+        yield (
+            f"{counted(stopped.size, 'tensioner')} met a stop, the one at "
+            f"{results.line('end_x')[most]:g} m with {1e-3 * force[most]:.3g} kN the most: its "
+            "wire does not have the tension of its weights. `catenary static` prints tensions at "
+            "rest; take a larger line.tensioner.travel_m, or a shorter section."
+        )
 
 
-def _about_contact(results: Results) -> list[str]:
+def _about_contact(results: Results) -> Iterator[str]:
     stiffnesses = results.facts_of("contact_stiffness")
     if np.isinf(stiffnesses).any():
-        return ["The contact is kinematic: head and wire do not part, so that loss cannot occur."]
-    found: dict[str, None] = {}
-    for mass, stiffness in zip(results.facts_of("touching_mass"), stiffnesses, strict=True):
+        yield "The contact is kinematic: head and wire do not part, so that loss cannot occur."
+        return
+    masses, step = results.facts_of("touching_mass"), results.fact("shortest_step")
+    yield from dict.fromkeys(
+        sentence
+        for mass, stiffness in zip(masses.tolist(), stiffnesses.tolist(), strict=True)
         # Without a train nothing touches the line.
-        if math.isfinite(mass) and math.isfinite(stiffness) and stiffness > 0.0:
-            head = _about_head(float(mass), float(stiffness), results.fact("shortest_step"))
-            found |= dict.fromkeys(head)
-    return list(found)
+        if math.isfinite(mass) and math.isfinite(stiffness) and stiffness > 0.0
+        for sentence in _about_head(mass, stiffness, step)
+    )
 
 
-def _about_head(mass: float, stiffness: float, dt: float) -> list[str]:
+def _about_head(mass: float, stiffness: float, dt: float) -> Iterator[str]:
     """Remarks on a head of a mass [kg] on its contact [N/m] at a step [s]."""
     contact, omega = stiffness_words(float(f"{stiffness:.3g}")), math.sqrt(stiffness / mass)
     frequency = omega / (2.0 * math.pi)
     begin = (
         f"A head of {mass:.3g} kg on a contact of {contact} has a resonance at {frequency:.3g} Hz"
     )
-    result = []
     if frequency < _FELT_HZ:
         where = "inside" if frequency < CUT_OFF else "near"
-        result.append(
+        yield (
             f"{begin}, {where} the 20 Hz band: results depend on the "
             "stiffness of the contact. Compare them only with results of the same stiffness."
         )
     if omega * dt > _RESOLVED:
-        result.append(
+        yield (
             f"{begin}: a step of {1e3 * dt:g} ms does not resolve its hops. If the head loses "
             "contact they feed the line, with forces several times too large, and the loss of "
             "contact counts steps, not losses. Take a smaller numerics.dt_s, a contact that damps, "
             "or numerics.newmark_gamma = 0.6 with newmark_beta = 0.3025."
         )
-    return result

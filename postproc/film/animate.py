@@ -16,7 +16,7 @@ from catenary.mbs.shape import Shape
 from catenary.postproc.files.own_files import GIF, MP4
 from catenary.postproc.film import drawing
 from catenary.postproc.film.drawing import ForceChart, RingingChart
-from catenary.postproc.film.film_data import FilmData, Snapshots, film_data
+from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import FilmOptions
 from catenary.postproc.film.scenery import (
     COLOURS,
@@ -104,7 +104,7 @@ def animate(
             f"a film needs {error.name}, which is not installed: pip install 'catenary[film]'"
         ) from error
     with Results(folder, records) as results:
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             made = Pictures(results, Scenery(data, snapshots, shapes), snapshots, options)
             shown = tqdm(

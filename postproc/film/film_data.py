@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from catenary.postproc.evaluate import filters
 from catenary.postproc.files.hdf5 import open_own
 from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.read.guard import survives
-from catenary.postproc.read.results import ContactProfile, Results
+from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.contents import OTHER_PARTS
 from catenary.postproc.record.snapshots.field_layout import PLACES, BlockTables
 from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
@@ -39,7 +39,6 @@ _SAME_TIME = 1e-9
 _UP = 2
 
 
-@dataclass(frozen=True)
 class FilmData:
     """A run as a film needs it; n records of p pantographs.
 
@@ -60,24 +59,38 @@ class FilmData:
     names : of the pantographs
     excitation : of the line in place of a train, whose place and force then
         stand in place of those of a pantograph; None with a train
+
+    Raises
+    ------
+    InputError
+        If the run has no two records.
     """
 
-    title: str
-    speed: float
-    points: np.ndarray
-    wires: dict[str, np.ndarray]
-    profiles: dict[str, ContactProfile]
-    elements: dict[str, np.ndarray]
-    droppers: np.ndarray
-    gone: np.ndarray
-    supports: np.ndarray
-    time: np.ndarray
-    position: np.ndarray
-    force: np.ndarray
-    filtered: np.ndarray
-    head_height: np.ndarray
-    names: list[str]
-    excitation: Excitation | None = None
+    def __init__(self, results: Results) -> None:
+        if results.n_steps < 1:
+            raise InputError(f"{results.path} holds no step, of which a film could be made")
+        about = results.attributes
+        self.title, self.time = str(about.get("title", "")), results.time
+        self.points, self.droppers = results.line("node_points"), results.line("droppers")
+        self.wires, self.elements = results.wires(), results.elements()
+        self.profiles, self.supports = results.contact_profiles(), results.line("support_x")
+        self.gone = _gone(results, self.points[self.droppers[:, 1], 0])
+        facts = about.get("excitation")
+        self.excitation: Excitation | None = excitation_of_facts(facts) if facts else None
+        if self.excitation is None:
+            self.names, self.speed = results.pantograph_names(), results.fact("speed")
+            self.position, self.force = (
+                results.channel(f"contact_{name}") for name in ("position", "force")
+            )
+            self.filtered = _filtered(results, self.force)
+            self.head_height = results.channel("head_height")
+        else:
+            own = self.excitation
+            self.names = [own.kind]
+            self.speed = own.speed if isinstance(own, MovingForce) else 0.0
+            self.position, self.force = (of(self.time)[:, None] for of in (own.place, own.value))
+            self.filtered = self.force
+            self.head_height = self.rest_height(self.position[:, 0])[:, None]
 
     @property
     def n_pantographs(self) -> int:
@@ -129,54 +142,6 @@ class FilmData:
         """The record nearest to a time [s]."""
         after = int(np.clip(self.time.searchsorted(time), 1, self.time.size - 1))
         return after - int(time - self.time[after - 1] < self.time[after] - time)
-
-
-def film_data(results: Results) -> FilmData:
-    """Read what a film of a run shows.
-
-    Raises
-    ------
-    InputError
-        If the run has no two records.
-    """
-    if results.n_steps < 1:
-        raise InputError(f"{results.path} holds no step, of which a film could be made")
-    force = results.channel("contact_force")
-    points, droppers = results.line("node_points"), results.line("droppers")
-    data = FilmData(
-        str(results.attributes.get("title", "")),
-        results.fact("speed"),
-        points,
-        results.wires(),
-        results.contact_profiles(),
-        results.elements(),
-        droppers,
-        _gone(results, points[droppers[:, 1], 0]),
-        results.line("support_x"),
-        results.time,
-        results.channel("contact_position"),
-        force,
-        _filtered(results, force),
-        results.channel("head_height"),
-        results.pantograph_names(),
-    )
-    facts = results.attributes.get("excitation")
-    return _excited(data, excitation_of_facts(facts)) if facts else data
-
-
-def _excited(data: FilmData, excitation: Excitation) -> FilmData:
-    """Data of a film of a line that an excitation sets into motion."""
-    position, force = (of(data.time)[:, None] for of in (excitation.place, excitation.value))
-    return replace(
-        data,
-        speed=excitation.speed if isinstance(excitation, MovingForce) else 0.0,
-        position=position,
-        force=force,
-        filtered=force,
-        head_height=data.rest_height(position[:, 0])[:, None],
-        names=[excitation.kind],
-        excitation=excitation,
-    )
 
 
 def _gone(results: Results, x: np.ndarray) -> np.ndarray:

@@ -14,10 +14,11 @@ compared: a passage that ends early is no error.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 from scipy.signal import argrelmin, correlate
 
@@ -183,7 +184,7 @@ class _Fit:
         self._cut_off, self._is_filtered = cut_off, is_filtered
         self._wave = run.speed / cut_off  # the shortest there is [m]
 
-    def model(self, passed: float | None) -> Callable[..., np.ndarray]:
+    def model(self, passed: float | None) -> CubicSpline:
         """The run's force if the file's values have passed a filter, beside the one of ours."""
         return self._run.below(passed, None if self._is_filtered else self._cut_off)
 
@@ -289,7 +290,6 @@ class _Fit:
             Lengths of the sections [m].
         """
         model = self.model(passed)
-        slope = model.derivative()  # type: ignore[attr-defined]
         for length in lengths:
             begin, end = self._section(length)
             at = self._place - shift - drift * (self._place - middle)
@@ -299,31 +299,11 @@ class _Fit:
             place, force = self._place[within], self._force[within]
             shift += drift * (place.mean() - middle)
             middle = float(place.mean())
-            arm = place - middle
-            scale = max(float(np.abs(arm).max()), 1e-9)
-
-            def residual(
-                x: np.ndarray, place: np.ndarray = place, force: np.ndarray = force,
-                arm: np.ndarray = arm, scale: float = scale,
-            ) -> np.ndarray:  # fmt: skip
-                return np.asarray(x[2] * model(place - x[0] - x[1] / scale * arm) + x[3] - force)
-
-            def jacobian(
-                x: np.ndarray, place: np.ndarray = place, arm: np.ndarray = arm,
-                scale: float = scale,
-            ) -> np.ndarray:  # fmt: skip
-                at = place - x[0] - x[1] / scale * arm
-                steep = -x[2] * slope(at)
-                return np.stack([steep, steep * arm / scale, model(at), np.ones(at.size)], axis=1)
-
-            guess = np.array([shift, drift * scale, 1.0, 0.0])
-            found = least_squares(residual, guess, jacobian, method="lm", max_nfev=60)
+            found, gradient, rest = _fitted(model, place, force, shift, drift)
             # Another minimum, which is begun from by itself; or a part that does not swing at all.
-            if abs(found.x[0] - shift) > 2.0 * self._wave or not _GAINS[0] < found.x[2] < _GAINS[1]:
+            if abs(found[0] - shift) > 2.0 * self._wave or not _GAINS[0] < found[2] < _GAINS[1]:
                 return None
-            shift, drift = float(found.x[0]), float(found.x[1] / scale)
-        rest = -found.fun
-        gradient = np.asarray(found.jac) * [1.0, scale, 1.0, 1.0]
+            shift, drift = float(found[0]), float(found[1])
         square = max(float(rest @ rest) / rest.size, (1e-6 * float(np.std(force)) + 1e-12) ** 2)
         n_independent = rest.size / correlation_time(rest)
         return _Refined(
@@ -409,6 +389,29 @@ class _Fit:
             return stated, certainty, 0.0
         effect = self.model(best)(at) - self.model(stated)(at)
         return best, certainty, float(np.sqrt(np.mean(effect**2)))
+
+
+def _fitted(
+    model: CubicSpline, place: np.ndarray, force: np.ndarray, shift: float, drift: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shift, drift, gain and offset (4,) with which the model is nearest to a force at places (n,),
+    from a shift and drift on; derivatives of the force by them (n, 4), and what remains."""
+    slope, arm = model.derivative(), place - place.mean()
+    scale = max(float(np.abs(arm).max()), 1e-9)  # of the drift, as a shift at an end
+
+    def at(x: np.ndarray) -> np.ndarray:
+        return np.asarray(place - x[0] - x[1] / scale * arm)
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        return np.asarray(x[2] * model(at(x)) + x[3] - force)
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        steep = -x[2] * slope(at(x))
+        return np.stack([steep, steep * arm / scale, model(at(x)), np.ones(arm.size)], axis=1)
+
+    guess, sizes = np.array([shift, drift * scale, 1.0, 0.0]), np.array([1.0, scale, 1.0, 1.0])
+    found = least_squares(residual, guess, jacobian, method="lm", max_nfev=60)
+    return found.x / sizes, np.asarray(found.jac) * sizes, -found.fun
 
 
 def _likely(tried: Iterable[_Refined | None]) -> list[_Refined]:

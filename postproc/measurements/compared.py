@@ -57,7 +57,7 @@ class Compared:
 
     Attributes
     ----------
-    name, pantograph, unit : in words; the unit is that of the values
+    figure, pantograph, unit : in words; the unit is that of the values
     run, measured : values
     tolerance : how far they may differ, NaN where none is known
     passed : None if it is not judged
@@ -65,7 +65,7 @@ class Compared:
     source : of the tolerance
     """
 
-    name: str
+    figure: str
     pantograph: str
     unit: str
     run: float
@@ -156,16 +156,11 @@ def _figures_table(found: Comparison) -> StudyTable:
         columns,
         [
             {
-                "figure": one.name,
-                "pantograph": one.pantograph,
-                "unit": one.unit,
-                "run": one.run,
-                "measured": one.measured,
+                **vars(one),
                 "difference": one.run - one.measured,
                 "tolerance": None if np.isnan(one.tolerance) else one.tolerance,
                 "verdict": VERDICTS[one.passed]
                 + (f" {UNCOMPARED}" if one.source == LINE_TEST and one.passed is not None else ""),
-                "because": one.because,
                 "source": one.source if not np.isnan(one.tolerance) else "",
             }
             for one in found.figures

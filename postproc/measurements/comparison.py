@@ -29,12 +29,7 @@ from catenary.postproc.measurements.compared import (
     Overlay,
     UpliftAtSupports,
 )
-from catenary.postproc.measurements.passage import (
-    MeasuredForce,
-    MeasuredUplift,
-    Passage,
-    RunForce,
-)
+from catenary.postproc.measurements.passage import MeasuredForce, MeasuredUplift, Passage, RunForce
 from catenary.postproc.read.results import Results, in_stretch
 
 # Errors of heights below this are of no account, however certain [m].

@@ -11,9 +11,6 @@ from scipy.ndimage import binary_dilation, binary_opening
 from catenary.base.errors import InputError
 from catenary.postproc.evaluate import filters
 
-# A filter leaves 1e-4 of what is beyond a record's end after so many periods of its cut-off.
-SETTLED = 6.0
-
 
 @dataclass(frozen=True)
 class MeasuredForce:
@@ -106,7 +103,7 @@ class Passage:
 
     def margin(self, dt: float) -> int:
         """Samples at either end of a record that the filter has spoiled."""
-        return 0 if self.is_filtered else int(np.ceil(SETTLED / (self.cut_off * dt)))
+        return 0 if self.is_filtered else int(np.ceil(filters.SETTLED / (self.cut_off * dt)))
 
     def untouched(self, measured: np.ndarray, dt: float) -> np.ndarray:
         """Which samples (n,), ``dt`` [s] apart, are not spoiled by gaps, where ``measured`` (n,) is

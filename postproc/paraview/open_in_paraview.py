@@ -24,7 +24,7 @@ from matplotlib.colors import to_rgb
 from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
 from catenary.postproc.files.disk import unwritten, write_whole
-from catenary.postproc.film.film_data import Snapshots, film_data
+from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import (
     COLOURS,
@@ -88,7 +88,7 @@ def write_script(
     """
     target = folder / FOLDER
     with Results(folder, records) as results:
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             scenery = Scenery(data, snapshots, shapes)
             if target.is_symlink():

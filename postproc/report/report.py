@@ -15,15 +15,9 @@ from catenary.postproc.evaluate.statistics import RunStatistics
 from catenary.postproc.evaluate.verdict import Criterion, criteria_of
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.disk import write_into
-from catenary.postproc.files.own_files import (
-    CHANNEL_PICTURE,
-    PICTURES,
-    REPORT_FILES,
-    remove_stale,
-)
+from catenary.postproc.files.own_files import CHANNEL_PICTURE, PICTURES, REPORT_FILES, remove_stale
 from catenary.postproc.read.results import Results
 from catenary.postproc.read.validation import Records
-from catenary.postproc.report import csv_tables
 from catenary.postproc.report.page import (
     EvaluatedRun,
     Picture,
@@ -135,7 +129,7 @@ def write_report(
         criteria = criteria_of(results, statistics)
         run = EvaluatedRun(results, statistics, criteria, *measured)
         summary = as_json(summarise(results, statistics, criteria, run.indicators))
-        content: dict[str, bytes | str] = {"droppers.csv": csv_tables.droppers_csv(results)}
+        content: dict[str, bytes | str] = {"droppers.csv": line.droppers_csv(results)}
         content |= beside or {}
         registration = results.registration()
         if registration is not None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -122,12 +123,8 @@ def write_study(
 
 def columns_csv(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> str:
     """Columns side by side as CSV text; shorter ones end in empty cells."""
-    values = [list(column) for column in columns.values()]
-    longest = max((len(column) for column in values), default=0)
-    rows = (
-        [_cell(column[i]) if i < len(column) else "" for column in values] for i in range(longest)
-    )
-    return csv_text(list(columns), rows)
+    values = ([_cell(value) for value in column] for column in columns.values())
+    return csv_text(list(columns), zip_longest(*values, fillvalue=""))
 
 
 def _cell(value: Any) -> Any:

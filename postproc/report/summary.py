@@ -100,10 +100,7 @@ def short_summary(
 
 
 def _short(
-    results: Results,
-    statistics: RunStatistics,
-    criteria: list[Criterion],
-    indicators: Indicators,
+    results: Results, statistics: RunStatistics, criteria: list[Criterion], indicators: Indicators
 ) -> dict[str, Any]:
     """Figures of ``short_summary``, not plain yet."""
     return {

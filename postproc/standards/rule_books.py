@@ -245,7 +245,7 @@ class Rule(_Part):
     ----------
     id : name within the book
     title : in words, as tables name it
-    quantity : key of ``QUANTITIES``
+    quantity : key of ``QUANTITIES``; the id where it is not given
     relation : how the value must stand to the limit
     limit : rows, of which the first that holds is the limit
     clause : where the limit stands
@@ -261,6 +261,12 @@ class Rule(_Part):
     clause: Text = ""
     compared: bool | None = None
     note: Text = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_quantity(cls, table: Any) -> Any:
+        known = isinstance(table, dict) and "id" in table
+        return {"quantity": table["id"], **table} if known else table
 
     @field_validator("quantity")
     @classmethod
@@ -416,12 +422,20 @@ def _plain(text: str, most: int = 200) -> str:
 
 @functools.cache
 def shipped() -> dict[str, RuleBook]:
-    """All shipped books by ``name:edition``, editions in their order."""
-    books = (
-        book_of(tomllib.loads(path.read_text(encoding="utf-8")), str(path))
-        for path in sorted(_FOLDER.glob("*.toml"))
-    )
-    return {book.key: book for book in books}
+    """All shipped books by ``name:edition``, editions in their order.
+
+    A file with ``editions`` is several books, with each of these in the place of ``{edition}``.
+    """
+    books = {}
+    for path in sorted(_FOLDER.glob("*.toml")):
+        text = path.read_text(encoding="utf-8")
+        for edition in tomllib.loads(text).get("editions", [""]):
+            table = tomllib.loads(text.replace("{edition}", edition))
+            if table.pop("editions", None):
+                table["edition"] = edition
+            book = book_of(table, str(path))
+            books[book.key] = book
+    return books
 
 
 def book_named(name: str) -> RuleBook:

@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from scenes import load_scene
 
-from catenary.cases.run.prepared import sound_rest
+from catenary.cases.run.at_rest import sound_rest
 from catenary.solver.ensemble import SceneHistory, SharedLine, march_side_by_side
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from scenes import load_scene
 
-from catenary.cases.run.prepared import sound_rest
+from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.studies.sensitivity.derivatives import change_by
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
 from catenary.solver.statics.line_at_rest import LineAtRest

@@ -25,7 +25,7 @@ from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.run_schema import RunAttributes
 from catenary.postproc.film import animate
 from catenary.postproc.film.drawing import RingingChart
-from catenary.postproc.film.film_data import Snapshots, film_data
+from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import FilmOptions
 from catenary.postproc.film.scenery import Scenery
 from catenary.postproc.paraview import open_in_paraview
@@ -71,7 +71,7 @@ def test_a_blow_leaves_the_files_of_a_run(struck: tuple[Path, WavesSeen]) -> Non
     """Its snapshots are, in single precision, what was seen in memory."""
     folder, seen = struck
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
         facts = results.attributes["excitation"]
         assert (results.channel("contact_force") == 0.0).all()
         assert results.extremes("dropper_force")[1].max() > 0.0
@@ -109,7 +109,7 @@ def test_a_film_shows_how_the_wire_rings_where_it_was_struck(
 ) -> None:
     folder, seen = struck
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
         assert isinstance(data.excitation, Blow)
         with Snapshots(folder, len(data.points)) as snapshots:
             axes, numbers = Figure().add_subplot(), np.arange(snapshots.times.size)
@@ -142,7 +142,7 @@ def test_report_and_film_of_a_blow_have_no_train(struck: tuple[Path, WavesSeen])
         assert passing.get_xlabel() == "time [s]"
         drawn = max(np.nanmax(line.get_ydata()) for line in passing.get_lines())
         check("uplift [mm]", drawn, 1e3 * evaluate(results).supports.maximum, within=1e-9)
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             made = animate.Pictures(
                 results, Scenery(data, snapshots), snapshots, FilmOptions(end=0.05)
@@ -156,7 +156,7 @@ def test_a_force_that_moves_is_seen_on_its_course(tmp_path: Path) -> None:
         tmp_path, "force", Excited(force=FORCE, frequency=2.0), "output.field_every_s=0.1"
     )
     with Results(tmp_path) as results:
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(tmp_path, len(data.points)) as snapshots:
             # The scene's own cadence.
             again = waves_seen(data, snapshots)

@@ -80,7 +80,7 @@ def test_figures_of_the_measurement_are_those_of_its_samples(
 ) -> None:
     found = found_in(run, table)
     own = table[(table.place_m >= 120.0) & (table.place_m <= 420.0)].force_N
-    by_name = {one.name: one for one in found.figures}
+    by_name = {one.figure: one for one in found.figures}
     # The alignment moves the stretch by millimetres: a sample less or more of a thousand,
     # which is off the mean by up to 80 N.
     check("mean", by_name["mean"].measured, own.mean(), within=0.1)
@@ -92,10 +92,10 @@ def test_figures_of_the_measurement_are_those_of_its_samples(
 def test_given_tolerances_are_kept(run: Path, table: pd.DataFrame) -> None:
     table = table.assign(force_N=table.force_N + 10.0)
     found = found_in(run, table, tolerances={"mean_N": 5.0, "maximum_N": 50.0, "std_percent": 30.0})
-    judged = {one.name: (one.passed, one.source, one.tolerance) for one in found.figures}
+    judged = {one.figure: (one.passed, one.source, one.tolerance) for one in found.figures}
     assert judged["mean"] == (False, "description", 5.0) and found.passed is False
     assert judged["maximum"] == (True, "description", 50.0)
-    deviation = next(one for one in found.figures if one.name == "standard deviation")
+    deviation = next(one for one in found.figures if one.figure == "standard deviation")
     assert deviation.tolerance == pytest.approx(0.3 * deviation.measured)
 
 
@@ -225,7 +225,7 @@ def test_gaps_are_left_out_and_told(run: Path, table: pd.DataFrame, is_filtered:
         # A wave of 20 Hz, 3.5 m, beyond the ends of the hole is left out, too.
         beyond = np.abs(at - place[highest])
         assert beyond.min() > 25 * (place[1] - place[0]) + 3.0
-    figures = {one.name: one for one in found.figures}
+    figures = {one.figure: one for one in found.figures}
     with Results(run) as results:
         raw, position = results.column("contact_force", 0), results.column("contact_position", 0)
     whole = signal.sosfiltfilt(signal.butter(6, 20.0, fs=500.0, output="sos"), raw, padlen=150)
@@ -248,7 +248,7 @@ def test_gaps_of_heights_are_left_out_and_told(run: Path, table: pd.DataFrame) -
     measured = {**PLACES, "head_height": {"column": "head_height_m"}}
     found = found_in(run, holed, measured=measured)
     assert [(one.kind, one.value) for one in found.findings] == [("gaps", 60.0)]
-    heights = {one.name: one for one in found.figures}["range of head height"]
+    heights = {one.figure: one for one in found.figures}["range of head height"]
     others = 1e3 * float(np.ptp(height[inside & ~gap]))
     # One sample more or less at the ends, 0.28 m on slopes of 1 in 1000.
     assert others < 1e3 * float(np.ptp(height[inside])) - 1.2

@@ -19,7 +19,7 @@ from scenes import load_scene, mesh_of, problem_of
 
 import catenary
 from catenary import InputError
-from catenary.cases.run.prepared import rest_of, sound_rest
+from catenary.cases.run.at_rest import rest_of, sound_rest
 from catenary.cases.scene.load import recorded_scene
 from catenary.cases.scene.scene import resolved
 from catenary.cases.studies.sensitivity.derivatives import (

@@ -14,11 +14,6 @@ from catenary.cases.run.arrivals import (
     Course,
     WaveLine,
     arrival_facts,
-    arrivals,
-    end_for,
-    far_share,
-    from_far_end,
-    reflection_felt,
     run_in_for,
     start_share,
     wave_line,
@@ -26,65 +21,65 @@ from catenary.cases.run.arrivals import (
 
 # One string, 1000 m, waves of 100 m/s.
 STRING = WaveLine(0.0, 1000.0, 50.0, 100.0, 100.0, 0.0, 0.0, 2.0 * math.pi)
-ALONE = Course(100.0, 900.0, 50.0, (300.0, 500.0), 100.0, 100.0)
+ALONE = Course(STRING, 100.0, 900.0, 50.0, (300.0, 500.0), 100.0, 100.0)
 
 
 def test_a_reflected_wave_meets_the_train_where_the_ways_add_up() -> None:
     """900 m to the end and d back while the train runs 900 - d: (900 + d) / 100 = (900 - d) / 50,
     d = 300: at 700 m after 12 s."""
-    found = arrivals(STRING, ALONE)
-    assert found.far_end is not None and found.near_end is not None
-    check("met at [m]", found.far_end.at, 700.0, within=1e-9)
-    check("after [s]", found.far_end.time, 12.0, within=1e-12)
+    assert ALONE.far_end is not None and ALONE.near_end is not None
+    check("met at [m]", ALONE.far_end.at, 700.0, within=1e-9)
+    check("after [s]", ALONE.far_end.time, 12.0, within=1e-12)
     # Back 100 m to the end and 100 + 50 t forward again: 100 t = 200 + 50 t.
-    check("from the near end at [m]", found.near_end.at, 300.0, within=1e-9)
-    check("after [s]", found.near_end.time, 4.0, within=1e-12)
-    check("run-in [m]", found.run_in, 200.0, within=1e-12)
-    check("run-in [spans]", found.run_in_spans, 4.0, within=1e-12)
-    assert not reflection_felt(STRING, ALONE)
+    check("from the near end at [m]", ALONE.near_end.at, 300.0, within=1e-9)
+    check("after [s]", ALONE.near_end.time, 4.0, within=1e-12)
+    check("run-in [m]", ALONE.run_in, 200.0, within=1e-12)
+    check("run-in [spans]", ALONE.run_in_spans, 4.0, within=1e-12)
+    assert not ALONE.feels_reflection
 
 
 def test_a_trailing_pantograph_meets_the_wave_of_the_leading_one_first() -> None:
     """The leader's wave from 300 m: 700 m to the end, d back; the trailing one runs 900 - d from
     100 m: (700 + d) / 100 = (900 - d) / 50, d = 366.7."""
     trailing = ALONE._replace(leader=300.0)
-    met = from_far_end(STRING, trailing)
+    met = trailing.far_end
     assert met is not None
     check("met at [m]", met.at, 1000.0 - 1100.0 / 3.0, within=1e-9)
 
 
 def test_the_shortest_line_without_a_reflection_is_met_at_the_end_of_the_stretch() -> None:
     course = ALONE._replace(stretch=(300.0, 800.0))
-    assert reflection_felt(STRING, course)
-    end = end_for(STRING, course)
-    met = from_far_end(STRING._replace(end=end), course)
+    assert course.feels_reflection
+    end = course.least_end
+    met = course._replace(line=STRING._replace(end=end)).far_end
     assert met is not None
     check("met at [m]", met.at, 800.0, within=1e-9)
-    assert not reflection_felt(STRING._replace(end=end + 1.0), course)
-    assert reflection_felt(STRING._replace(end=end - 1.0), course)
+    assert not course._replace(line=STRING._replace(end=end + 1.0)).feels_reflection
+    assert course._replace(line=STRING._replace(end=end - 1.0)).feels_reflection
 
 
 def test_damping_takes_amplitude_on_the_way() -> None:
     """Mass damping alone: exp(-beta t / 2). What is met at 800 m left the leader at x with
     (1000 - x + 200) / 100 = (800 - x) / 50: x = 400, 8 s before."""
-    course = ALONE._replace(stretch=(300.0, 800.0))
-    check("share", far_share(STRING._replace(beta=0.5), course), math.exp(-2.0), within=1e-12)
-    heavy = STRING._replace(beta=2.0)
-    assert far_share(heavy, course) < 1e-3
-    assert not reflection_felt(heavy, course)
+
+    def course(**damping: float) -> Course:
+        return ALONE._replace(line=STRING._replace(**damping), stretch=(300.0, 800.0))
+
+    check("share", course(beta=0.5).far_share, math.exp(-2.0), within=1e-12)
+    heavy = course(beta=2.0)
+    assert heavy.far_share < 1e-3
+    assert not heavy.feels_reflection
     # ln(1000) / 1 s at 50 m/s, there and back: 172.7 m behind the stretch they have faded.
-    check("end [m]", end_for(heavy, course), 800.0 + 25.0 * math.log(1000.0), within=1e-9)
+    check("end [m]", heavy.least_end, 800.0 + 25.0 * math.log(1000.0), within=1e-9)
     # On stiffness: alpha w^2 / 2 with w = pi c / span = 2 pi 1/s.
-    damped = STRING._replace(alpha=0.02)
     expected = math.exp(-0.01 * (2.0 * math.pi) ** 2 * 8.0)
-    check("share", far_share(damped, course), expected, within=1e-12)
+    check("share", course(alpha=0.02).far_share, expected, within=1e-12)
 
 
 def test_a_train_as_fast_as_the_waves_meets_none() -> None:
     fast = ALONE._replace(speed=100.0, stretch=(300.0, 800.0))
-    found = arrivals(STRING, fast)
-    assert found.far_end is None and found.near_end is None and found.far_share == 0.0
-    assert not reflection_felt(STRING, fast)
+    assert fast.far_end is None and fast.near_end is None and fast.far_share == 0.0
+    assert not fast.feels_reflection
 
 
 def test_the_run_in_that_is_asked_for_leaves_the_limit() -> None:

@@ -16,7 +16,7 @@ from scenes import Scene, mesh_of, problem_of, read_draft
 import catenary
 from catenary import InputError
 from catenary.base.process import alone
-from catenary.cases.run.prepared import sound_rest
+from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.scene.input.case_files import REMOVED
 from catenary.cases.studies import ensemble as scenes_on_lines
 from catenary.cases.studies.ensemble import Marched, Marches

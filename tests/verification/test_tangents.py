@@ -23,7 +23,7 @@ from small_lines import EN_CONTACT_WIRE, WHOLE, en50318_line, mesh_of, numerics,
 from studies import few
 
 from catenary import InputError
-from catenary.cases.run.prepared import sound_rest
+from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.studies.sensitivity.derivatives import change_by
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
 from catenary.mbs.lumped_data import LumpedData

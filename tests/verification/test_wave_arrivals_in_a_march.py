@@ -12,7 +12,7 @@ import pytest
 from scenes import load_scene, problem_of
 
 import catenary
-from catenary.cases.run.arrivals import Course, arrival_facts, from_far_end, wave_line
+from catenary.cases.run.arrivals import Course, arrival_facts, wave_line
 
 # A contact force that differs by more is another one [N]: 4e-5 of the standard deviation, far above
 # round-off, which is 1e-9.
@@ -47,9 +47,9 @@ def test_the_force_changes_where_the_wave_is_met(
     x = far.position.values
     first = float(x[np.abs(near.values - far.values) > OTHER][0])
     start = problem.train.start
-    course = Course(start, problem.train.end, problem.train.speed, problem.evaluation, start, start)
-    line = wave_line(problem)
-    soonest = from_far_end(line._replace(speed=BENDING * line.fastest), course)
+    line, train = wave_line(problem), problem.train
+    fast = line._replace(speed=BENDING * line.fastest)
+    soonest = Course(fast, start, train.end, train.speed, problem.evaluation, start, start).far_end
     assert soonest is not None
     print(
         f"{case}, {short} spans, {speed} km/h: differs from {first:.1f} m on, long waves are met "

@@ -23,7 +23,7 @@ import pandas as pd
 from scipy.optimize import OptimizeResult, least_squares
 
 from catenary.base.errors import CatenaryError, InputError
-from catenary.cases.run.prepared import sound_rest
+from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.studies.identification.measurement import (
     FORCE,

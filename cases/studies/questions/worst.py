@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import CatenaryError
-from catenary.cases.run.prepared import rest_of
+from catenary.cases.run.at_rest import rest_of
 from catenary.cases.scene.load import recorded_scene
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.cases.run.prepared import sound_rest
+from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
 from catenary.cases.terminal.runs_bar import RunsBar

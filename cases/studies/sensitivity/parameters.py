@@ -23,7 +23,7 @@ import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.base.options import option
-from catenary.cases.run.prepared import rest_of
+from catenary.cases.run.at_rest import rest_of
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.input.case_files import value_at
 from catenary.cases.scene.input.faults import Origin, shown

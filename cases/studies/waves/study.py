@@ -50,7 +50,7 @@ from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks
-from catenary.postproc.film.film_data import Snapshots, film_data
+from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.read.guard import examined
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.study_table import Content, write_files
@@ -106,7 +106,7 @@ def study_waves(folder: Path) -> tuple[str, list[Path]]:
         If there is no run with snapshots, or nothing can be written.
     """
     with Results(folder, examined(folder)) as results:
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(folder, len(data.points), until=float(data.time[-1])) as snapshots:
             snapshots.need_whole()
             scene = recorded_scene(results.attributes["config"], folder)

@@ -24,13 +24,10 @@ from catenary.postproc.report.pictures.figures import (
     GREY,
     LIGHT,
     SHADE,
-    colour,
     curve,
-    legend_above,
     line,
     own_style,
     stacked,
-    thinned,
     thinned_ranges,
     tidy,
     uprights,
@@ -84,18 +81,11 @@ def panels_along_track(
             if low_pass:
                 with contextlib.suppress(InputError):  # the report says so
                     values = filters.low_pass(values, results.dt)
-            chosen = thinned(values)
-            values = factor * values[chosen]
-            axes.plot(
-                results.column("contact_position", p)[chosen],
-                values,
-                color=colour(number if len(curves) > 1 else p),
-                linewidth=1.2,
-                linestyle=("-", "--")[number % 2] if dashed else "-",
-                label=name,
+            position, own = results.column("contact_position", p), number if curves[1:] else p
+            curve(
+                axes, position, factor * values, own, name, "-" if not dashed else line(number % 2)
             )
-        tidy(axes, "", label, title_of(results, p))
-        legend_above(axes)
+        tidy(axes, "", label, title_of(results, p), legend=True)
     panels[-1].set_xlabel("position of the pantograph along the track [m]")
     return figure, panels
 
@@ -200,13 +190,10 @@ def overlaid_forces(
     figure, axes = stacked(0.7 + 2.3 * n, n, shared=True)
     for own, (name, curves) in zip(axes, panels, strict=True):
         for number, (label, place, force) in enumerate(curves):
-            chosen = thinned(force)
-            look = line(number)
-            curve(own, place[chosen], force[chosen], number, label, look)
+            curve(own, place, force, number, label, line(number))
         _shade(own, evaluated)
         force_of = f"contact force, {below} [N]" if below else "contact force [N]"
-        tidy(own, "", force_of, capital(name))
-        legend_above(own)
+        tidy(own, "", force_of, capital(name), legend=True)
     axes[-1].set_xlabel(POSITION)
     return figure
 
@@ -228,11 +215,9 @@ def overlaid_uplifts(
         return None
     figure, (axes,) = stacked(3.2, 1)
     for number, (label, place, uplift) in enumerate(curves):
-        look = _MARKS[number % len(_MARKS)]
-        curve(axes, place, 1e3 * uplift, number, label, look)
+        curve(axes, place, 1e3 * uplift, number, label, _MARKS[number % len(_MARKS)])
     _shade(axes, evaluated)
-    tidy(axes, POSITION, "largest uplift [mm]")
-    legend_above(axes)
+    tidy(axes, POSITION, "largest uplift [mm]", legend=True)
     return figure
 
 

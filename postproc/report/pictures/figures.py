@@ -189,7 +189,7 @@ def curve(
     width: float = 1.2,
     **how: Any,
 ) -> None:
-    """Draw a curve with the colour of a number.
+    """Draw a curve with the colour of a number, a long one by its extremes.
 
     Parameters
     ----------
@@ -209,6 +209,9 @@ def curve(
         Further properties of Matplotlib's line, which win.
     """
     usual: dict[str, Any] = {"color": colour(number), "linewidth": width, "ms": 3.5, "label": label}
+    shown = thinned(np.asarray(y))
+    if isinstance(shown, np.ndarray):
+        x, y = np.asarray(x)[shown], np.asarray(y)[shown]
     axes.plot(x, y, look, **(usual | how))
 
 
@@ -230,7 +233,7 @@ def uprights(axes: Axes, x: np.ndarray, low: Any, high: Any, **how: Any) -> None
     axes.plot(np.repeat(x, 3), np.stack(ends, axis=1).ravel(), solid_capstyle="butt", **how)
 
 
-def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
+def tidy(axes: Axes, x_label: str, y_label: str, title: str = "", *, legend: bool = False) -> None:
     """Give a panel labels, a light grid, few ticks and no box.
 
     Parameters
@@ -241,6 +244,8 @@ def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
         Quantity of each axis, with its unit in brackets.
     title : str, optional
         Title above the panel, at its left.
+    legend : bool, optional
+        Whether a legend stands above the panel, at its right.
     """
     for axis, most in zip((axes.xaxis, axes.yaxis), _MOST_TICKS, strict=True):
         if isinstance(axis.get_major_locator(), AutoLocator):
@@ -253,6 +258,8 @@ def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
+    if legend:
+        legend_above(axes)
 
 
 def wrapped(label: str, width: int = 22) -> str:

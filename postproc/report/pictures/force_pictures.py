@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -33,7 +34,6 @@ from catenary.postproc.report.pictures.figures import (
     line,
     own_style,
     stacked,
-    thinned,
     tidy,
 )
 
@@ -52,24 +52,12 @@ def contact_force(results: Results) -> Figure:
         mark_line(axes, results, start, end, named=p == 0)
         if p < len(arrivals):
             _mark_arrivals(axes, results.evaluation[0], arrivals[p])
-        force = results.column("contact_force", p)
-        chosen = thinned(force)
-        light: dict[str, Any] = {"alpha": 0.3, "linewidth": 0.6, "label": "unfiltered"}
-        curves = [(chosen, force[chosen], light)]
-        try:
+        position, force = (results.column(f"contact_{name}", p) for name in ("position", "force"))
+        curve(axes, position, force, p, "unfiltered", width=0.6, alpha=0.3)
+        with contextlib.suppress(InputError):  # sampled too slowly; the report says so
             force = filters.contact_force(results, p)
-        except InputError:  # sampled too slowly; the report says so
-            pass
-        else:
-            chosen = thinned(force)
-            curves.append((chosen, force[chosen], {"linewidth": 1.5, "label": "20 Hz low-pass"}))
-        del force
-        position = results.column("contact_position", p)
-        for chosen, values, style in curves:
-            axes.plot(position[chosen], values, color=colour(p), **style)
-        del position
-        tidy(axes, "", "contact force [N]", title_of(results, p))
-        legend_above(axes)
+            curve(axes, position, force, p, "20 Hz low-pass", width=1.5)
+        tidy(axes, "", "contact force [N]", title_of(results, p), legend=True)
     panels[-1].set_xlabel("position along the track [m]")
     return figure
 
@@ -121,8 +109,7 @@ def force_spectrum(results: Results, lengths: Mapping[str, float]) -> Figure:
     axes.axvline(filters.CUT_OFF, color=LIMIT, linewidth=0.9, label="end of the filtered band")
     axes.set_yscale("log")
     axes.set_xlim(0.0, _HIGHEST)
-    tidy(axes, "frequency [Hz]", "spectral density [N²/Hz]")
-    legend_above(axes)
+    tidy(axes, "frequency [Hz]", "spectral density [N²/Hz]", legend=True)
     return figure
 
 
@@ -148,10 +135,8 @@ def contact_height(
     ):
         mark_line(axes, results, start, end, named=axes is height)
         for p, (name, own) in enumerate(heights.items()):
-            chosen = thinned(own[number])
-            curve(axes, own[0][chosen], factor * own[number][chosen], p, name, line(p))
-        tidy(axes, "", label)
-        legend_above(axes)
+            curve(axes, own[0], factor * own[number], p, name, line(p))
+        tidy(axes, "", label, legend=True)
     gradient.set_xlabel("position of the pantograph along the track [m]")
     return figure
 
@@ -183,15 +168,10 @@ def wire_forces(results: Results) -> Figure:
 @own_style()
 def force_statistics(statistics: RunStatistics) -> Figure:
     """Bars of mean, deviation, extremes and mean +- 3 sigma of each pantograph."""
-    groups = ("mean", "std", "maximum", "minimum", "stat_max", "stat_min")
-    labels = (
-        "mean",
-        "standard\ndeviation",
-        "maximum",
-        "minimum",
-        "mean + 3 sigma",
-        "mean − 3 sigma",
-    )
+    groups = {
+        **{"mean": "mean", "std": "standard\ndeviation", "maximum": "maximum"},
+        **{"minimum": "minimum", "stat_max": "mean + 3 sigma", "stat_min": "mean − 3 sigma"},
+    }
     shown = [(i, p) for i, p in enumerate(statistics.pantographs) if not p.complaint]
     figure, (axes,) = stacked(3.4, 1)
     width = 0.8 / max(len(shown), 1)
@@ -203,11 +183,10 @@ def force_statistics(statistics: RunStatistics) -> Figure:
         labels_of_bars = [f"{round(value)}" for value in values]
         axes.bar_label(bars, labels_of_bars, padding=2, fontsize=8 if len(shown) < 4 else 6)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
-    axes.set_xticks(np.arange(len(groups)), labels)
+    axes.set_xticks(np.arange(len(groups)), list(groups.values()))
     axes.margins(y=0.12)
-    tidy(axes, "", "contact force, 20 Hz [N]", "Statistics in the evaluation stretch")
+    tidy(axes, "", "contact force, 20 Hz [N]", "Statistics in the evaluation stretch", legend=True)
     axes.grid(False, axis="x")
-    legend_above(axes)
     return figure
 
 
@@ -226,8 +205,7 @@ def force_histogram(statistics: RunStatistics) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(12, steps=[1, 2, 2.5, 5, 10]))
     widths = sorted({f"{np.diff(p.histogram_edges[:2])[0]:g}" for _, p in shown}, key=float)
     title = f"Histogram, bins of {' and '.join(widths)} N"
-    tidy(axes, "contact force, 20 Hz [N]", "share of time [%]", title)
-    legend_above(axes)
+    tidy(axes, "contact force, 20 Hz [N]", "share of time [%]", title, legend=True)
     return figure
 
 

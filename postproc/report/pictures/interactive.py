@@ -17,7 +17,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex, to_rgba
 from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Transform
 
@@ -75,7 +76,7 @@ def as_json(figure: Figure) -> str:
     for number, axes in enumerate(panels, start=1):
         own = "" if number == 1 else str(number)
         layout |= _axes(axes, own, panels)
-        for trace in _traces(axes):
+        for trace in (*_bars(axes), *_curves(axes), *_ranges(axes)):
             name = trace.get("name", "")
             trace["showlegend"] = bool(name) and name not in named
             named.add(name)
@@ -100,10 +101,7 @@ def _axes(axes: Axes, own: str, panels: Sequence[Axes]) -> dict[str, Any]:
     box = axes.get_position()
     x: dict[str, Any] = {"domain": [box.x0, box.x1], "anchor": f"y{own}"}
     y: dict[str, Any] = {"domain": [box.y0, box.y1], "anchor": f"x{own}"}
-    for axis, limits, entry in (
-        (axes.xaxis, axes.get_xlim(), x),
-        (axes.yaxis, axes.get_ylim(), y),
-    ):
+    for axis, limits, entry in ((axes.xaxis, axes.get_xlim(), x), (axes.yaxis, axes.get_ylim(), y)):
         is_log = axis.get_scale() == "log"
         ends = np.log10(limits) if is_log else np.asarray(limits)
         entry |= {
@@ -131,13 +129,6 @@ def _axes(axes: Axes, own: str, panels: Sequence[Axes]) -> dict[str, Any]:
     return {f"xaxis{own}": x, f"yaxis{own}": y}
 
 
-def _traces(axes: Axes) -> Iterator[dict[str, Any]]:
-    """Curves, points, bars and ranges of a panel."""
-    yield from _bars(axes)
-    yield from _curves(axes)
-    yield from _ranges(axes)
-
-
 def _bars(axes: Axes) -> Iterator[dict[str, Any]]:
     for bars in axes.containers:
         if isinstance(bars, BarContainer):
@@ -161,9 +152,8 @@ def _curves(axes: Axes) -> Iterator[dict[str, Any]]:
         modes = [*(["lines"] if drawn else []), *(["markers"] if marker in _SYMBOLS else [])]
         if not modes:
             continue
-        colour, face = to_hex(line.get_color()), line.get_markerfacecolor()
         symbol = _SYMBOLS.get(marker, "circle")
-        is_open = str(face) == "none" and not symbol.endswith("-open")
+        is_open = str(line.get_markerfacecolor()) == "none" and not symbol.endswith("-open")
         yield {
             "type": "scatter",
             "mode": "+".join(modes),
@@ -171,8 +161,7 @@ def _curves(axes: Axes) -> Iterator[dict[str, Any]]:
             "x": _numbers(line.get_xdata()) or [None],
             "y": _numbers(line.get_ydata()) or [None],
             "opacity": line.get_alpha() or 1.0,
-            "line": {"color": colour, "width": line.get_linewidth(),
-                     "dash": _DASHES.get(str(style), "solid")},
+            "line": _look(line),
             "marker": {"color": to_hex(line.get_markeredgecolor()),
                        "size": line.get_markersize() + 1.0,
                        "symbol": f"{symbol}-open" if is_open else symbol},
@@ -198,8 +187,9 @@ def _ranges(axes: Axes) -> Iterator[dict[str, Any]]:
 
 def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
     """Lines and stripes that run across a panel."""
+    of_bars = {bar for bars in axes.containers if isinstance(bars, BarContainer) for bar in bars}
     for patch in axes.patches:
-        if _of_bars(axes, patch) or not isinstance(patch, Rectangle):
+        if patch in of_bars or not isinstance(patch, Rectangle):
             continue
         low, high = patch.get_xy(), (
             patch.get_x() + patch.get_width(), patch.get_y() + patch.get_height()
@@ -212,13 +202,8 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
         across = line.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform())
         if across and np.size(line.get_xdata()) == 2 and line.get_linestyle() != "None":
             (x0, y0), (x1, y1) = np.asarray(line.get_xydata())[[0, -1]].tolist()
-            yield {
-                "type": "line",
-                "line": {"color": to_hex(line.get_color()), "width": line.get_linewidth(),
-                         "dash": _DASHES.get(str(line.get_linestyle()), "solid")},
-                **_ends(axes, own, line.get_transform(), (x0, y0), (x1, y1)),
-                **_named(line.get_label()),
-            }  # fmt: skip
+            ends = _ends(axes, own, line.get_transform(), (x0, y0), (x1, y1))
+            yield {"type": "line", "line": _look(line), **ends, **_named(line.get_label())}
     for ranges in axes.collections:
         if isinstance(ranges, LineCollection) and ranges.get_transform() != axes.transData:
             colour = _colour_of(ranges)
@@ -226,6 +211,11 @@ def _shapes(axes: Axes, own: str) -> Iterator[dict[str, Any]]:
                 ends = _ends(axes, own, ranges.get_transform(), low, high)
                 look, name = {"color": colour, "width": 1.0}, _named(ranges.get_label())
                 yield {"type": "line", "layer": "below", "line": look, **ends, **name}
+
+
+def _look(line: Line2D) -> dict[str, Any]:
+    dash = _DASHES.get(str(line.get_linestyle()), "solid")
+    return {"color": to_hex(line.get_color()), "width": line.get_linewidth(), "dash": dash}
 
 
 def _colour_of(lines: LineCollection) -> str:
@@ -237,18 +227,9 @@ def _ends(axes: Axes, own: str, transform: Transform, low: Any, high: Any) -> di
     by_x = transform == axes.get_xaxis_transform()
     by_y = transform == axes.get_yaxis_transform()
     (x0, y0), (x1, y1) = _numbers(low), _numbers(high)
-    return {
-        "xref": f"x{own} domain" if by_y else f"x{own}",
-        "yref": f"y{own} domain" if by_x else f"y{own}",
-        "x0": x0,
-        "x1": x1,
-        "y0": y0,
-        "y1": y1,
-    }
-
-
-def _of_bars(axes: Axes, patch: Patch) -> bool:
-    return any(patch in bars for bars in axes.containers if isinstance(bars, BarContainer))
+    refs = {"xref": f"x{own} domain" if by_y else f"x{own}"}
+    refs["yref"] = f"y{own} domain" if by_x else f"y{own}"
+    return {**refs, "x0": x0, "x1": x1, "y0": y0, "y1": y1}
 
 
 def _annotations(axes: Axes, own: str) -> Iterator[dict[str, Any]]:

@@ -73,8 +73,7 @@ def draw_line(
     def panel(left: float, low: float, width: float, height: float) -> Axes:
         whole = _HEIGHT + below
         return figure.add_axes(
-            (left / _WIDTH, (low + below) / whole, width / _WIDTH, height / whole),
-            facecolor="none",
+            (left / _WIDTH, (low + below) / whole, width / _WIDTH, height / whole), facecolor="none"
         )
 
     side = panel(_LEFT, _LOW + _PLAN + _GAP, _LONG, _SIDE)

@@ -34,11 +34,10 @@ from catenary.postproc.report.pictures.figures import (
     LINES,
     MARKS,
     colour,
-    legend_above,
+    curve,
     new_figure,
     own_style,
     stacked,
-    thinned,
     tidy,
     uprights,
 )
@@ -99,8 +98,7 @@ def arm_uplift(results: Results, statistics: RunStatistics, limit: float) -> Fig
         else:
             along.plot([], [], color=LIMIT, linewidth=1.1, label=f"{label}, far above")
     along.set_ylim(bottom=0.0)
-    tidy(along, POSITION, "largest uplift [mm]", "All arms")
-    legend_above(along)
+    tidy(along, POSITION, "largest uplift [mm]", "All arms", legend=True)
     return figure
 
 
@@ -126,12 +124,10 @@ def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> N
         zero = supports.x
         before, after = -60.0, float(behind.max()) + 140.0
 
-    def curve(arm: int) -> tuple[np.ndarray, np.ndarray]:
+    def history(arm: int) -> tuple[np.ndarray, np.ndarray]:
         from_to = np.searchsorted(abscissa, zero[arm] + np.array([before, after]))
         rows = slice(*np.clip(from_to, 0, results.n_rows("arm_uplift")).tolist())
-        uplift = results.column("arm_uplift", arm, rows)
-        chosen = thinned(uplift)
-        return abscissa[rows][chosen] - zero[arm], 1e3 * uplift[chosen]
+        return abscissa[rows] - zero[arm], 1e3 * results.column("arm_uplift", arm, rows)
 
     worst = int(evaluated[np.argmax(supports.uplift[evaluated])]) if evaluated.size else None
     others = evaluated[evaluated != worst]
@@ -141,25 +137,19 @@ def _passing_train(axes: Axes, results: Results, statistics: RunStatistics) -> N
         label += f", {shown.size} of {others.size}"
     for number, arm in enumerate(shown):
         once = label if number == 0 else None
-        axes.plot(*curve(int(arm)), color=LIGHT, linewidth=0.8, label=once)
+        curve(axes, *history(int(arm)), 0, once, width=0.8, color=LIGHT)
     if worst is not None:
-        axes.plot(
-            *curve(worst),
-            color="#222222",
-            linewidth=1.6,
-            label=f"largest uplift, arm at {supports.x[worst]:.1f} m",
-        )
+        label = f"largest uplift, arm at {supports.x[worst]:.1f} m"
+        curve(axes, *history(worst), 0, label, width=1.6, color="#222222")
     # As far as a curve reaches: the record of a short run ends soon after the last arm.
     known = np.concatenate([behind, *(line.get_xdata() for line in axes.lines)])
     if excited is None and axes.lines:
         before, after = max(before, float(known.min())), min(after, float(known.max()))
     for p, name in enumerate(names):
-        axes.axvline(
-            behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=f"{name} passes"
-        )
+        label = f"{name} passes"
+        axes.axvline(behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=label)
     axes.set_xlim(before, after)
-    tidy(axes, over, "uplift [mm]", "Evaluated arms")
-    legend_above(axes)
+    tidy(axes, over, "uplift [mm]", "Evaluated arms", legend=True)
 
 
 @own_style()
@@ -178,21 +168,17 @@ def dropper_force(results: Results, statistics: RunStatistics) -> Figure:
             chosen.insert(0, (worst, f"lowest force, dropper at {x[worst]:.1f} m", "#222222"))
     for dropper, label, line_colour in chosen:
         force = results.column("dropper_force", dropper)
-        shown = thinned(force)
-        force = force[shown]
-        history.plot(results.line_time[shown], force, color=line_colour, linewidth=1.2, label=label)
+        curve(history, results.line_time, force, 0, label, color=line_colour)
     history.axhline(0.0, color=LIMIT, linewidth=1.0, linestyle="--", label="slack")
     history.margins(x=0.0)
-    tidy(history, "time [s]", "dropper force [N]", "Histories")
-    legend_above(history)
+    tidy(history, "time [s]", "dropper force [N]", "Histories", legend=True)
 
     mark_line(along, results, *with_margin(x))
     draw_ranges(along, x, droppers.lowest, droppers.highest)
     slack = droppers.slackened
     along.plot(x[slack], droppers.lowest[slack], "v", color=LIMIT, ms=4, label="slackened")
     along.axhline(0.0, color=GREY, linewidth=0.8)
-    tidy(along, POSITION, "dropper force [N]", "All droppers")
-    legend_above(along)
+    tidy(along, POSITION, "dropper force [N]", "All droppers", legend=True)
     return figure
 
 
@@ -219,22 +205,10 @@ def _draw_profile(axes: Axes, results: Results) -> None:
         shown = (x >= start) & (x <= end)
         if np.count_nonzero(shown) < 2:
             continue
-        axes.plot(
-            x[shown],
-            1e3 * (height[shown] - level),
-            color=colour(number),
-            linewidth=1.5,
-            linestyle="--" if number else "-",
-            label=f"{wire_words(name)} at rest",
-        )
+        heights, label = 1e3 * (height[shown] - level), f"{wire_words(name)} at rest"
+        curve(axes, x[shown], heights, number, label, "--" if number else "-", 1.5)
     mark_static(axes, results, float(start), float(end))
-    tidy(
-        axes,
-        POSITION,
-        f"height above {level:.3f} m [mm]",
-        "Profile at rest",
-    )
-    legend_above(axes)
+    tidy(axes, POSITION, f"height above {level:.3f} m [mm]", "Profile at rest", legend=True)
 
 
 def _draw_elasticity(axes: Axes, results: Results) -> None:
@@ -245,26 +219,16 @@ def _draw_elasticity(axes: Axes, results: Results) -> None:
     if len(there) > 1:
         names = list(results.contact_profiles())
         for number in there:
-            known = np.isfinite(own[:, number])
-            axes.plot(
-                at[known],
-                1e3 * own[known, number],
-                color=colour(number),
-                linestyle="--" if number else "-",
-                label=f"{wire_words(names[number])} alone",
-            )
-    look = (GREY, "all contact wires") if len(there) > 1 else (COLOURS[0], "elasticity")
-    axes.plot(at, 1e3 * lift, color=look[0], linewidth=1.5, label=look[1])
+            known, label = np.isfinite(own[:, number]), f"{wire_words(names[number])} alone"
+            look = "--" if number else "-"
+            curve(axes, at[known], 1e3 * own[known, number], number, label, look, 1.5)
+    tone, label = (GREY, "all contact wires") if len(there) > 1 else (COLOURS[0], "elasticity")
+    axes.plot(at, 1e3 * lift, color=tone, linewidth=1.5, label=label)
     if at.size:
         mark_static(axes, results, float(at.min()), float(at.max()))
     axes.set_ylim(bottom=0.0)
-    tidy(
-        axes,
-        POSITION,
-        "elasticity [mm/N]",
-        f"Elasticity along span {results.span_at_rest + 1}",
-    )
-    legend_above(axes)
+    title = f"Elasticity along span {results.span_at_rest + 1}"
+    tidy(axes, POSITION, "elasticity [mm/N]", title, legend=True)
 
 
 @own_style()
@@ -273,12 +237,11 @@ def energies(results: Results) -> Figure:
     recorded = results.energies()
     figure, (axes,) = stacked(3.0, 1)
     for number, name in enumerate(("kinetic", "elastic")):
-        chosen = thinned(recorded[name])
-        curve = recorded["time"][chosen], recorded[name][chosen]
-        axes.plot(*curve, color=COLOURS[number], linestyle=("-", "--")[number], label=name)
+        curve(axes, recorded["time"], recorded[name], number, name, LINES[number], 1.5)
     axes.margins(x=0.0)
-    tidy(axes, "time [s]", "energy [J]", "Energies of the line relative to equilibrium")
-    legend_above(axes)
+    tidy(
+        axes, "time [s]", "energy [J]", "Energies of the line relative to equilibrium", legend=True
+    )
     return figure
 
 
@@ -295,8 +258,7 @@ def plan_view(results: Results) -> Figure:
         plan.plot(*wire.drawn(wire.y), color=colour(number), linewidth=1.2, label=label)
     plan.plot(registration.x, registration.stagger, "o", ms=3, color=GREY, label="steady arm")
     plan.axhline(0.0, color=GREY, linewidth=0.6, linestyle="--")
-    tidy(plan, POSITION, "to the left [m]", "Contact wire from above")
-    legend_above(plan)
+    tidy(plan, POSITION, "to the left [m]", "Contact wire from above", legend=True)
     pushed = registration.pushed
     for which, look, label in (
         (~pushed, "o", "arm that pulls"),
@@ -307,14 +269,9 @@ def plan_view(results: Results) -> Figure:
             at, force = registration.x[which], registration.force[which, 0]
             forces.plot(at, force, look, ms=4, color=tone, label=label)
     forces.axhline(0.0, color=GREY, linewidth=0.8)
-    tidy(
-        forces,
-        POSITION,
-        "force to the left [N]",
-        "Radial forces of the steady arms",
-    )
-    if forces.get_legend_handles_labels()[0]:  # none without arms
-        legend_above(forces)
+    has_arms = bool(forces.get_legend_handles_labels()[0])
+    title = "Radial forces of the steady arms"
+    tidy(forces, POSITION, "force to the left [N]", title, legend=has_arms)
     forces.set_xlim(plan.get_xlim())
     return figure
 
@@ -434,8 +391,7 @@ def _draw_on_line(results: Results, channel: Channel) -> Figure:
     figure, (axes,) = stacked(3.4, 1)
     mark_line(axes, results, float(np.min(x, initial=0.0)), float(np.max(x, initial=1.0)))
     draw_ranges(axes, x, low, high)
-    tidy(axes, POSITION, _label(channel))
-    legend_above(axes)
+    tidy(axes, POSITION, _label(channel), legend=True)
     return figure
 
 
@@ -452,16 +408,10 @@ def _draw_at_ends(results: Results, channel: Channel) -> Figure | None:
     for axes, number in zip(panels, there.tolist(), strict=True):
         own = np.flatnonzero((wire == number) & ((low != 0.0) | (high != 0.0)))
         for k, column in enumerate(own.tolist()):
-            values = results.column(channel.name, column)
-            chosen = thinned(values)
-            side = "from" if outwards[column] < 0 else "up to"
-            label = f"wire {side} {x[column]:g} m"
-            time = results.line_time[chosen]
-            axes.plot(time, values[chosen], color=colour(k), linewidth=1.2, label=label)
+            label = f"wire {'from' if outwards[column] < 0 else 'up to'} {x[column]:g} m"
+            curve(axes, results.line_time, results.column(channel.name, column), k, label)
         axes.margins(x=0.0)
-        tidy(axes, "", _label(channel), wire_words(names[number]))
-        if own.size:
-            legend_above(axes)
+        tidy(axes, "", _label(channel), wire_words(names[number]), legend=bool(own.size))
     panels[-1].set_xlabel("time [s]")
     return figure
 
@@ -469,9 +419,7 @@ def _draw_at_ends(results: Results, channel: Channel) -> Figure | None:
 @own_style()
 def _draw_energy(time: np.ndarray, values: np.ndarray, channel: Channel) -> Figure:
     figure, (axes,) = stacked(3.0, 1)
-    chosen = thinned(values)
-    axes.plot(time[chosen], values[chosen], color=COLOURS[0], label=_word(channel))
+    curve(axes, time, values, 0, _word(channel), width=1.5)
     axes.margins(x=0.0)
-    tidy(axes, "time [s]", _label(channel))
-    legend_above(axes)
+    tidy(axes, "time [s]", _label(channel), legend=True)
     return figure

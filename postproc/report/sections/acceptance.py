@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from shlex import quote
 
 import numpy as np
@@ -90,11 +90,16 @@ def errors_of(run: EvaluatedRun) -> dict[str, dict[str, float]]:
     if run.measured:
         names = ["", *(one.name for one in run.statistics.pantographs)]
         return {quantity: dict.fromkeys(names, error) for quantity, error in run.measured.items()}
-    found: dict[str, dict[str, float]] = {}
-    for one, error in zip(run.statistics.pantographs, run.indicators.force_error, strict=True):
-        for quantity, factor in _TIMES_RMS.items():
-            found.setdefault(quantity, {})[one.name] = factor * float(error)
-    return found
+    return _by_rms(run, run.indicators.force_error)
+
+
+def _by_rms(run: EvaluatedRun, errors: Iterable[float]) -> dict[str, dict[str, float]]:
+    """Errors by quantity and pantograph, from rms errors of the force histories [N]."""
+    pairs = list(zip(run.statistics.pantographs, errors, strict=False))
+    return {
+        quantity: {one.name: factor * float(error) for one, error in pairs}
+        for quantity, factor in _TIMES_RMS.items()
+    }
 
 
 def _error_of(one: Criterion, errors: Mapping[str, Mapping[str, float]]) -> float:
@@ -186,11 +191,8 @@ def _start_up(run: EvaluatedRun) -> dict[str, dict[str, float]]:
     It is an rms error of the force history, as that of the time step is.
     """
     facts = run.results.attributes.get("arrivals", {}).get("pantographs", [])
-    found: dict[str, dict[str, float]] = {}
-    for one, fact in zip(run.statistics.pantographs, facts, strict=False):
-        for quantity, factor in _TIMES_RMS.items():
-            found.setdefault(quantity, {})[one.name] = factor * fact["start_share_of_std"] * one.std
-    return found
+    pairs = zip(run.statistics.pantographs, facts, strict=False)
+    return _by_rms(run, [fact["start_share_of_std"] * one.std for one, fact in pairs])
 
 
 def section(run: EvaluatedRun) -> Section:

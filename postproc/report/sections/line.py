@@ -1,18 +1,81 @@
-"""The line in motion and at rest: uplift, droppers, elasticity, registration."""
+"""The line in motion and at rest: uplift, droppers as they are cut, elasticity, registration."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from catenary.postproc.evaluate.wording import counted, wire_words
+from catenary.postproc.evaluate.statistics import slack_times
+from catenary.postproc.evaluate.wording import counted, fixed, wire_words
+from catenary.postproc.files.csv_text import csv_text
 from catenary.postproc.read.results import Results
-from catenary.postproc.report import csv_tables
-from catenary.postproc.report.csv_tables import DropperRow
 from catenary.postproc.report.page import EvaluatedRun, Folded, Picture, Section, Text, number
 from catenary.postproc.report.study_table import StudyTable, texts_table
+
+
+class DropperRow(NamedTuple):
+    """A dropper for the installer.
+
+    Attributes
+    ----------
+    nth : number in the file, from 0
+    span, number : by which a scene names it, from 1, the latter along the track over all wires
+    position, x : from the span's left support and along the track [m]
+    length, force : [m], at rest [N]
+    wires : names of the wires that it hangs from and carries; none where all droppers join the same
+    """
+
+    nth: int
+    span: int
+    number: int
+    position: float
+    x: float
+    length: float
+    force: float
+    wires: tuple[str, ...]
+
+
+def dropper_table(results: Results) -> list[DropperRow]:
+    """All droppers of the line in order of x. Not collective."""
+    span, x, masts = (results.line(name) for name in ("dropper_span", "dropper_x", "support_x"))
+    length, force = results.static("dropper_length"), results.static("dropper_force")
+    wires, names = results.dropper_wires(), list(results.roles)
+    several = bool((wires != wires[:1]).any())
+    order = np.argsort(x, kind="stable")
+    first = np.searchsorted(span[order], span)  # of each dropper's span, along the track
+    return [
+        DropperRow(
+            i,
+            int(span[i]) + 1,
+            along - int(first[i]) + 1,
+            float(x[i] - masts[span[i]]),
+            float(x[i]),
+            float(length[i]),
+            float(force[i]),
+            tuple(names[wire] for wire in wires[i]) if several else (),
+        )
+        for along, i in enumerate(order.tolist())
+    ]
+
+
+def droppers_csv(results: Results) -> str:
+    """The dropper table as CSV text, lengths to a tenth of a millimetre.
+
+    Beside the force at rest stand the least and the largest one of every step, and for how long the
+    dropper was slack; they are empty where they are not known.
+    """
+    heads = ["span", "dropper", "position in span [m]", "position [m]", "length [m]", "force [N]"]
+    heads += ["least force [N]", "largest force [N]", "slack [s]"]
+    of_run = *results.extremes("dropper_force"), slack_times(results)
+    rows, table = dropper_table(results), []
+    for row in rows:
+        cut = (fixed(value, 4) for value in (row.position, row.x, row.length))
+        known = zip((own[row.nth] for own in of_run), (2, 2, 3), strict=True)
+        felt = (fixed(value, digits) if np.isfinite(value) else "" for value, digits in known)
+        table.append([row.span, row.number, *cut, fixed(row.force, 2), *felt, *row.wires])
+    return csv_text([*heads, *(["hangs from", "carries"] if rows and rows[0].wires else [])], table)
 
 
 def in_motion(run: EvaluatedRun) -> Section:
@@ -75,34 +138,30 @@ def _of_rest(results: Results) -> Iterator[Text | StudyTable]:
             f"{outside}{together}: {low:#.3g} to {high:#.3g} mm/N (non-uniformity "
             f"{number(100 * (high - low) / (high + low))} %)."
         )
-    own = [row for row in csv_tables.dropper_table(results) if row.span == span]
+    own = [row for row in dropper_table(results) if row.span == span]
     if own:
-        yield _droppers(results, own, f"Droppers of span {span}", first=1)
+        yield _droppers(own, f"Droppers of span {span}", first=1)
 
 
 def _all_droppers(results: Results) -> Iterator[Folded]:
-    rows = csv_tables.dropper_table(results)
+    rows = dropper_table(results)
     if not rows:
         return
     title = f"Droppers of all spans ({len(rows)}), also in droppers.csv"
-    yield Folded(title, _droppers(results, rows))
+    yield Folded(title, _droppers(rows))
 
 
-def _droppers(
-    results: Results, rows: Sequence[DropperRow], title: str = "", first: int = 0
-) -> StudyTable:
+def _droppers(rows: Sequence[DropperRow], title: str = "", first: int = 0) -> StudyTable:
     """A table of droppers from the column ``first`` on."""
     heads = ["span", "dropper", "position in span [m]", "position [m]", "length [m]"]
-    heads.append("force at rest [N]")
-    several = csv_tables.joins_several(results)
-    heads += ["hangs from", "and carries"] if several else []
+    heads += ["force at rest [N]", *(["hangs from", "and carries"] if rows[0].wires else [])]
     cells = [
-        [row.span, row.number, number(row.position, 3), number(row.x, 3), number(row.length, 3),
-         number(row.force),
-         *((wire_words(row.upper), wire_words(row.lower)) if several else ())]
+        [row.span, row.number,
+         *(number(value, 3) for value in (row.position, row.x, row.length)), number(row.force),
+         *map(wire_words, row.wires)][first:]
         for row in rows
     ]  # fmt: skip
-    return texts_table(heads[first:], [row[first:] for row in cells], set(range(6 - first)), title)
+    return texts_table(heads[first:], cells, set(range(6 - first)), title)
 
 
 def has_registration(run: EvaluatedRun) -> bool:

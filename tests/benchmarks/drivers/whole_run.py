@@ -45,7 +45,7 @@ def main() -> None:
         from catenary.cases.run import runner
         from catenary.solver.time_loop.march import March
 
-        timed(runner, "_run", "imports of a run", "")
+        timed(runner._Run, "make", "imports of a run", "")
         timed(March, "run", "mesh, rest, solver prepared", "march and records")
         return found
 

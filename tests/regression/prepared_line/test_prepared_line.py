@@ -22,7 +22,7 @@ from studies import few
 
 from catenary import InputError, RunBroken
 from catenary.base.options import command_line
-from catenary.cases.run.prepared import HEADER, LIBRARY, prepare_line
+from catenary.cases.run.at_rest import HEADER, LIBRARY, prepare_line
 from catenary.cases.studies.hard import runs
 from catenary.solver.kernels.native import Simulation
 

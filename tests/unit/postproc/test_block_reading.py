@@ -27,9 +27,7 @@ from catenary.postproc.report.pictures import figures
 
 @pytest.mark.parametrize("shape", [(1,), (2,), (300,), (150_000,), (70_000, 2)])
 @pytest.mark.parametrize("band", [(filters.low_pass, 20.0), (filters.band_5_20, 5.0)])
-def test_filters_in_blocks_are_those_of_scipy(
-    shape: tuple[int, ...], band: tuple[Any, float]
-) -> None:
+def test_filters_are_those_of_scipy(shape: tuple[int, ...], band: tuple[Any, float]) -> None:
     apply, slowest = band
     values = 140.0 + np.random.default_rng(3).normal(size=shape)
     kind: Any = ("low", 20.0) if apply is filters.low_pass else ("bandpass", (5.0, 20.0))

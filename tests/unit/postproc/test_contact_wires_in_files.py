@@ -18,12 +18,12 @@ from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import facts_of
 from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.evaluate.error_indicators import indicate
-from catenary.postproc.film.film_data import film_data
+from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.read.results import ContactProfile, LineOfRun, Results
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.report import csv_tables
 from catenary.postproc.report.pictures import figures, force_pictures, line_pictures
 from catenary.postproc.report.report import write_report
+from catenary.postproc.report.sections.line import dropper_table
 from catenary.solver.problem.problem import Damping
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March
@@ -115,17 +115,17 @@ def test_arms_and_droppers_of_several_wires_are_named(
     at_one = [row["wire"] for row in supports if row["x_m"] == supports[0]["x_m"]]
     assert sorted(at_one) == [FIRST, SECOND]
     with Results(path) as results:
-        rows = csv_tables.dropper_table(results)
+        rows = dropper_table(results)
         droppers, x = results.line("droppers"), results.line("dropper_x")
         for nth, name in enumerate((FIRST, SECOND)):
-            own = [row for row in rows if row.lower == name and row.span == 2]
+            own = [row for row in rows if row.wires[1] == name and row.span == 2]
             assert [row.number for row in own] == [2 * i + 1 + nth for i in range(len(own))]
             places = [line.dropper_of_span(2, row.number) for row in own]
             assert places == [(pytest.approx(row.x), nth) for row in own]
             nodes = results.wires()[name]
             expected = np.sort(x[np.isin(droppers[:, 1], nodes)])
-            np.testing.assert_allclose([row.x for row in rows if row.lower == name], expected)
-        assert {row.upper for row in rows} == {"messenger_wire"}
+            np.testing.assert_allclose([row.x for row in rows if row.wires[1] == name], expected)
+        assert {row.wires[0] for row in rows} == {"messenger_wire"}
     text = (tmp_path / "droppers.csv").read_text()
     assert text.splitlines()[0].endswith(",hangs from,carries") and f",{SECOND}" in text
     assert ">and carries</th>" in (tmp_path / "report.html").read_text()
@@ -203,7 +203,7 @@ def test_films_show_the_wire_that_is_touched(tmp_path: Path, usual: dict[str, An
     """In an overlap the lower one, whatever its name and mean height are."""
     path = recorded(overlap(), tmp_path, usual)
     with Results(path) as results:
-        data = film_data(results)
+        data = FilmData(results)
         profiles = results.contact_profiles()
     assert data.contacts == [FIRST, SECOND]
     assert data.touched(10.0) == FIRST and data.touched(40.0) == SECOND

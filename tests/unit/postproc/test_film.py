@@ -29,7 +29,7 @@ from catenary.postproc.files.hdf5 import seal_attributes, set_attribute
 from catenary.postproc.film import animate, drawing, scenery, video
 from catenary.postproc.film.animate import Pictures
 from catenary.postproc.film.drawing import ForceChart
-from catenary.postproc.film.film_data import Snapshots, film_data
+from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import FilmOptions, View
 from catenary.postproc.film.scenery import FORCES, PANTOGRAPHS, TRAIN, Projection, Scenery
 from catenary.postproc.read.guard import survives
@@ -77,7 +77,7 @@ def folder(recorded: Callable[..., Path]) -> Path:
 @contextmanager
 def pictures_of(folder: Path, options: FilmOptions, shapes: Any = None) -> Iterator[Pictures]:
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             yield Pictures(results, Scenery(data, snapshots, shapes), snapshots, options)
 
@@ -136,7 +136,7 @@ def _blown(folder: Path, aside: float) -> None:
 def test_motions_sideways_are_read_and_seen_from_above(folder: Path) -> None:
     _blown(folder, 0.125)
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
         nodes = data.wires["contact_wire"]
         with Snapshots(folder, len(data.points)) as snapshots:
             moved = snapshots.displacement(7)
@@ -256,7 +256,7 @@ def test_masses_are_where_the_snapshots_have_them(folder: Path, make_march: Any)
     march = make_march(n_steps=1000, separations=(0.0,))
     shape = shape_of(LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0)))
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             found = Scenery(data, snapshots, [shape])
             frame = snapshots.frame(0.35)
@@ -283,7 +283,7 @@ def test_a_head_that_touches_nothing_is_where_it_is(folder: Path) -> None:
     with h5py.File(folder / "run.h5", "r+") as file:
         file["channels/contact_force"][...] = 0.0
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             rest, moved = Scenery(data, snapshots).beside(0.35, snapshots.frame(0.35))[FORCES]
     row = data.row_at(0.35)
@@ -374,7 +374,7 @@ def test_pantographs_stand_on_the_roof_and_reach_the_wire(recorded: Callable[...
 
 def test_views_are_chosen_by_what_lies_beside_each_other(folder: Path) -> None:
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
         with Snapshots(folder, len(data.points)) as snapshots:
             assert Scenery(data, snapshots).best_view is View.SIDE
             data.points[3, 1] = 0.2

@@ -19,7 +19,7 @@ from matplotlib.colors import to_rgb
 from studies import few
 
 from catenary import RunBroken
-from catenary.postproc.film.film_data import Snapshots, film_data
+from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import MOTIONS
 from catenary.postproc.paraview import open_in_paraview
@@ -45,7 +45,7 @@ def test_heads_arms_and_forces_are_where_the_record_has_them(folder: Path) -> No
     script, *files = open_in_paraview.write_script(folder, None)
     assert script == folder / "paraview" / "view.py"
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
     nodes = data.wires["contact_wire"]
     arms, forces = (pyvista.get_reader(path) for path in files[:2])
     np.testing.assert_allclose(arms.time_values, 0.05 * np.arange(11))
@@ -152,7 +152,7 @@ def test_the_script_runs_from_end_to_end(
     made = runpy.run_path(str(script))
     (x, _, _), at = window.CameraPosition, window.CameraFocalPoint
     with Results(folder) as results:
-        data = film_data(results)
+        data = FilmData(results)
     middle = data.position[data.row_at(0.25)].mean()
     ahead = {View.ALONG: 0.1 * made["WIDTH"]}.get(view, 0.0)
     assert at[0] == pytest.approx(middle + ahead)

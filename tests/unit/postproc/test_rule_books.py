@@ -62,6 +62,15 @@ def test_every_quantity_is_judged_or_limits_in_a_shipped_book() -> None:
     assert used == set(QUANTITIES)
 
 
+def test_a_criterion_without_a_quantity_judges_that_of_its_id() -> None:
+    table = changed("criteria", 1, "quantity", to=None)
+    table["criteria"][1]["id"] = "force_std"
+    assert book_of(table, "book").criteria[1].quantity == "force_std"
+    table["criteria"][1]["id"] = "sigma"
+    with pytest.raises(InputError, match="quantity 'sigma', but it must be one of mean_force"):
+        book_of(table, "book")
+
+
 def test_a_book_says_its_limits_in_words() -> None:
     book = book_of(BOOK, "book")
     assert [rule.words() for rule in book.criteria] == [
