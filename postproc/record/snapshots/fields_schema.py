@@ -1,4 +1,5 @@
-"""The attributes and tables of ``fields.h5``, declared once, and read against the declaration.
+"""The attributes and tables of ``fields.h5``, declared once, read against the declaration, and told
+to ParaView as XDMF.
 
 As ``run_schema`` and ``result_tables`` do for ``run.h5``. Fields themselves are checked for kind
 and length here, and for their values snapshot by snapshot. Not collective.
@@ -6,6 +7,7 @@ and length here, and for their values snapshot by snapshot. Not collective.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
 import h5py
@@ -13,6 +15,7 @@ import numpy as np
 from h5py import h5d
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from catenary.postproc.files import xdmf
 from catenary.postproc.files.hdf5 import HDF5_ERRORS
 from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, count_table, largest
 from catenary.postproc.read.validation import read_attributes, table_values
@@ -198,3 +201,45 @@ def _field(file: h5py.File, name: str, kind: FieldKind, n_points: int) -> None:
     rows = kind.values_of(n_points)
     shape = (rows, kind.components)[: 1 + (kind.components > 1)]
     _table(file, f"{name}/{kind.name}", np.dtype(kind.number), shape)
+
+
+def xdmf_of(file: h5py.File, tables: FieldTables, path: str) -> str:
+    """XDMF of the snapshots of a file, which is at ``path`` beside the text."""
+    times = tables.times.tolist()
+    blocks = [
+        xdmf.collection(name, _grids(file[name], name, block, times, path))
+        for name, block in tables.blocks.items()
+    ]
+    return xdmf.document(xdmf.collection("line", blocks, "Spatial"))
+
+
+def _grids(
+    group: h5py.Group, name: str, block: BlockTables, times: list[float], path: str
+) -> Iterator[str]:
+    """The grids of a block at ``times`` [s]."""
+    kinds = [kind for kind in KINDS.values() if kind.name in group]
+    names = ("cells", "points", *(kind.name for kind in kinds))
+    cells, points, *fields = (
+        xdmf.Item(own.shape, own.dtype, path, own.id.get_offset() or 0)
+        for own in map(group.__getitem__, names)
+    )
+    counts = block.count.tolist()
+    starts = (np.cumsum(block.count) - block.count).tolist()
+    for k, time in enumerate(times):
+        first, n = int(block.first[k]), counts[k]
+        # The XDMF reader takes a mesh for the one before if its items begin alike.
+        mark = f"<!-- {first} {n} -->"
+        yield xdmf.grid(
+            name,
+            cells.rows(int(block.cell_first[k]), int(block.cell_count[k]), mark),
+            points.rows(first, n, mark),
+            [
+                xdmf.Values(
+                    kind.name,
+                    field.rows(kind.values_of(starts[k]), kind.values_of(n)),
+                    kind.of_droppers,
+                )
+                for kind, field in zip(kinds, fields, strict=True)
+            ],
+            time,
+        )

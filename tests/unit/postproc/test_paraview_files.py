@@ -17,6 +17,7 @@ import pytest
 import pyvista
 from matplotlib.colors import to_rgb
 from studies import few
+from watched_fields import blocks_at
 
 from catenary import RunBroken
 from catenary.postproc.film.film_data import Snapshots, film_data
@@ -44,6 +45,9 @@ def test_heads_arms_and_forces_are_where_the_record_has_them(folder: Path) -> No
         file["contact_wire/displacement"][:, 1] = aside
     script, *files = open_in_paraview.write_script(folder, None)
     assert script == folder / "paraview" / "view.py"
+    line = folder / "paraview" / "line.xdmf"
+    assert line == files[-1] and len(blocks_at(line, 0.5)["droppers"].cell_data) == 0
+    assert "contact_wire" in blocks_at(line, 0.5)
     with Results(folder) as results:
         data = film_data(results)
     nodes = data.wires["contact_wire"]
