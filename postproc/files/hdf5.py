@@ -56,6 +56,10 @@ COLUMNS_AT_ONCE = 256
 _SLICE = 1 << 18
 
 
+class Damage(Exception):
+    """A file is damaged; the message is a clause that follows its name."""
+
+
 def put_array(group: h5py.Group, name: str, values: Any) -> h5d.DatasetID:
     """Store an array in place of an earlier one of its name; returns its table.
 
@@ -376,17 +380,13 @@ def write_window(
                 dataset[part, across] = np.where(inside, shown, np.nan)
 
 
-class DamagedClock(Exception):
-    """A table of times cannot be read; the message is a clause."""
-
-
 def rows_before(clock: h5py.Dataset, n: int, time: float) -> int:
     """Number of the first ``n`` times of a ``clock``, a table of ascending times, before ``time``
-    [s]; `DamagedClock` if they cannot be read."""
+    [s]; `Damage` if they cannot be read."""
     try:
         return int(np.searchsorted(clock[:n], time))
     except OSError as error:
-        raise DamagedClock(f"{clock.name[1:]} is damaged") from error
+        raise Damage(f"{clock.name[1:]} is damaged") from error
 
 
 def shorten(file: h5py.File, path: str, rows: int) -> int:

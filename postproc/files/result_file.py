@@ -354,7 +354,7 @@ def _write_head(
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "n_steps_planned": stage.n_steps,
         "n_strips": list(stage.train.n_strips),
-        "line_record": record.as_table(),
+        "line_record": record.model_dump(by_alias=True),
     }
     for name, value in {**header.attributes, **fixed}.items():
         set_attribute(file, name, as_attribute(value))

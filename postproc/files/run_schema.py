@@ -6,7 +6,6 @@ against them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any, NamedTuple, NotRequired
 
@@ -17,7 +16,7 @@ from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.facts import FACTS
 from catenary.postproc.channels.facts import WIRE as CONTACT_WIRE
-from catenary.postproc.channels.header import LineRecord, from_table
+from catenary.postproc.channels.header import LineRecord
 from catenary.postproc.standards.rule_books import (
     DEFAULT,
     LIMIT_KEYS,
@@ -66,16 +65,6 @@ def read_by(read: Callable[[Any], object]) -> AfterValidator:
         return value
 
     return AfterValidator(check)
-
-
-def _read_line_record(table: Any) -> None:
-    record = from_table(table)
-    ends = [*(record.window or ()), *(record.stretch or ())]
-    known = set(channels.line_channels())
-    if not (1 <= record.every <= 10**9 and all(map(math.isfinite, ends))):
-        raise ValueError("cadence or places")
-    if not set(record.names) <= known:
-        raise ValueError("channels")
 
 
 def _read_watched(table: dict[str, Any]) -> None:
@@ -135,7 +124,7 @@ _Effects = Annotated[
 class RunAttributes(BaseModel):
     """The root attributes; ``description`` is how an error names a valid value.
 
-    Those without a default are needed for a report; others take it where they are damaged.
+    Those without a default are needed for a report; others take it where they are missing.
     """
 
     model_config = ConfigDict(strict=True, defer_build=True)
@@ -199,7 +188,7 @@ class RunAttributes(BaseModel):
     n_strips: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], JSON] = Field(
         default=[], description="a list of whole numbers"
     )
-    line_record: Annotated[dict[str, Any], JSON, read_by(_read_line_record)] = Field(
+    line_record: Annotated[LineRecord, JSON] = Field(
         default=MISSING, description="what is recorded of the line"
     )
     detour: Text = ""

@@ -17,13 +17,13 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.meshgen.line import DropperPlace, droppers_at
 from catenary.postproc.evaluate import filters
-from catenary.postproc.files.hdf5 import open_own
+from catenary.postproc.files.hdf5 import Damage, open_own
 from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import ContactProfile, Results
 from catenary.postproc.record.snapshots.contents import OTHER_PARTS
 from catenary.postproc.record.snapshots.field_layout import PLACES, BlockTables
-from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields, xdmf_of
+from catenary.postproc.record.snapshots.fields_schema import read_fields, xdmf_of
 from catenary.solver.waves.excitation import Excitation, MovingForce, excitation_of_facts
 
 # Defects and incidents after which a dropper is not there.
@@ -296,7 +296,7 @@ class Snapshots:
         path, file = self._path, self._file
         try:
             tables = read_fields(file)
-        except FieldsFault as error:
+        except Damage as error:
             if "uplift" in file:
                 raise InputError(
                     f"{path} was written by an earlier version of Catenary; run the scene again"

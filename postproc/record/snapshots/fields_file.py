@@ -33,7 +33,7 @@ from catenary.postproc.files.disk import (
     write_whole,
 )
 from catenary.postproc.files.disk_errors import reason
-from catenary.postproc.files.hdf5 import open_own, put_array, set_attribute
+from catenary.postproc.files.hdf5 import Damage, open_own, put_array, set_attribute
 from catenary.postproc.record.snapshots.contents import Block
 from catenary.postproc.record.snapshots.field_layout import (
     FORMAT,
@@ -134,7 +134,7 @@ class FieldsFile:
             return False
         # Of all that reads files this alone is for runs that continue one.
         from catenary.postproc.read.guard import survives
-        from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
+        from catenary.postproc.record.snapshots.fields_schema import read_fields
 
         try:
             if not survives(self.path):
@@ -153,7 +153,7 @@ class FieldsFile:
             if planned.size > len(self._planned):
                 self._lengthen(planned)
                 return True
-        except (OSError, KeyError, RuntimeError, TypeError, ValueError, FieldsFault):
+        except (OSError, KeyError, RuntimeError, TypeError, ValueError, Damage):
             logger.warning(
                 "%s cannot be continued, it is damaged or of another version: its snapshots now "
                 "begin at t = %.3f s",

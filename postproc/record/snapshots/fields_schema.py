@@ -16,7 +16,7 @@ from h5py import h5d
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from catenary.postproc.files import xdmf
-from catenary.postproc.files.hdf5 import HDF5_ERRORS
+from catenary.postproc.files.hdf5 import HDF5_ERRORS, Damage
 from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, count_table, largest
 from catenary.postproc.read.validation import read_attributes, table_values
 from catenary.postproc.record.snapshots.contents import FIXED, KINDS, OTHER_PARTS, FieldKind
@@ -77,25 +77,19 @@ class FieldTables(NamedTuple):
     blocks: dict[str, BlockTables]
 
 
-class FieldsFault(Exception):
-    """A file of snapshots is invalid; the message is a clause."""
-
-
 def read_fields(file: h5py.File) -> FieldTables:
     """All of a file of snapshots but the fields and the places of pantographs.
 
     Raises
     ------
-    FieldsFault
+    Damage
         If anything is missing, of another kind, or does not fit the rest.
     """
-    about, *faults = read_attributes(file, FieldsAttributes)
-    for fault in sum(faults, []):
-        raise FieldsFault(fault)
+    about = read_attributes(file, FieldsAttributes)
     clock = _table(file, "times", np.dtype("<f8"), (None,))
     n_planned = clock.shape[0]
     if n_planned > _MOST_SNAPSHOTS:
-        raise FieldsFault(f"times has {n_planned} rows, and no run has so many snapshots")
+        raise Damage(f"times has {n_planned} rows, and no run has so many snapshots")
     sizes = _read(file, SIZES, count_table(("pantograph",), most=_MOST_PLACES), {})
     _table(file, PLACES, np.dtype("<f8"), (n_planned, sizes.size + int(sizes.sum())))
     n_nodes = int(about["n_nodes"])
@@ -115,27 +109,24 @@ def _table(
         there, own = table.shape, table.dtype
         layout = table.id.get_create_plist().get_layout()
     except HDF5_ERRORS as error:
-        raise FieldsFault(f"{path} is missing or cannot be read") from error
+        raise Damage(f"{path} is missing or cannot be read") from error
     if kind is not None and own != kind:
-        raise FieldsFault(f"{path} holds {own} in place of {kind}")
+        raise Damage(f"{path} holds {own} in place of {kind}")
     wanted = (
         tuple(size if one is None else one for one, size in zip(shape, there, strict=False))
         + shape[len(there) :]
     )
     if there != wanted:
-        raise FieldsFault(f"{path} has the shape {there} in place of {wanted}")
+        raise Damage(f"{path} has the shape {there} in place of {wanted}")
     if layout != h5d.CONTIGUOUS or (table.size and table.id.get_offset() is None):
-        raise FieldsFault(f"{path} does not stand in one piece in the file")
+        raise Damage(f"{path} does not stand in one piece in the file")
     return table
 
 
 def _read(file: h5py.File, path: str, declared: Table, sizes: dict[str, int]) -> np.ndarray:
     """The values of a table as it is declared; ``sizes`` of dimensions are added."""
     _table(file, path, None, (None,) * len(declared.dimensions))
-    values, fault = table_values(file, path, declared, sizes)
-    if values is None:
-        raise FieldsFault(fault)
-    return values
+    return table_values(file, path, declared, sizes)
 
 
 def _times(clock: h5py.Dataset) -> np.ndarray:
@@ -149,9 +140,9 @@ def _times(clock: h5py.Dataset) -> np.ndarray:
             break
     times = np.concatenate(parts)
     if not (np.diff(times) > 0.0).all():
-        raise FieldsFault("times does not ascend")
+        raise Damage("times does not ascend")
     if times.size and not 0.0 <= times[0] <= times[-1] <= largest("s"):
-        raise FieldsFault(f"times reaches from {times[0]:g} to {times[-1]:g} s, which cannot be")
+        raise Damage(f"times reaches from {times[0]:g} to {times[-1]:g} s, which cannot be")
     return times
 
 
@@ -169,10 +160,10 @@ def _block(file: h5py.File, name: str, n_planned: int, n_nodes: int) -> BlockTab
     wrong = (found.count < least) | (found.first + found.count > most)
     wrong |= (found.first % step != 0) | (found.count % step != 0)
     if wrong.any() or most % step:
-        raise FieldsFault(f"{name}/first and {name}/count do not show points out of its {most}")
+        raise Damage(f"{name}/first and {name}/count do not show points out of its {most}")
     fault = _cells_fault(found)
     if fault:
-        raise FieldsFault(f"{name}/{fault}")
+        raise Damage(f"{name}/{fault}")
     for kind in KINDS.values():
         if kind.name in file[name]:
             _field(file, name, kind, int(found.count.sum()))
@@ -197,7 +188,7 @@ def _cells_fault(block: BlockTables) -> str:
 
 
 def _field(file: h5py.File, name: str, kind: FieldKind, n_points: int) -> None:
-    """Raise FieldsFault unless a field has its numbers for all points of all snapshots."""
+    """Raise Damage unless a field has its numbers for all points of all snapshots."""
     rows = kind.values_of(n_points)
     shape = (rows, kind.components)[: 1 + (kind.components > 1)]
     _table(file, f"{name}/{kind.name}", np.dtype(kind.number), shape)
