@@ -14,9 +14,9 @@ from typing_extensions import TypedDict
 
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.facts import FACTS
-from catenary.postproc.channels.facts import WIRE as CONTACT_WIRE
-from catenary.postproc.channels.header import LineRecord
+from catenary.postproc.files.facts import FACTS
+from catenary.postproc.files.facts import WIRE as CONTACT_WIRE
+from catenary.postproc.files.header import LineRecord
 from catenary.postproc.standards.rule_books import (
     DEFAULT,
     LIMIT_KEYS,

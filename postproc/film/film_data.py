@@ -21,8 +21,11 @@ from catenary.postproc.files.hdf5 import Damage, open_own
 from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import ContactProfile, Results
-from catenary.postproc.record.snapshots.contents import OTHER_PARTS
-from catenary.postproc.record.snapshots.field_layout import PLACES, BlockTables
+from catenary.postproc.record.snapshots.contents import (
+    OTHER_PARTS,
+    PLACES,
+    BlockTables,
+)
 from catenary.postproc.record.snapshots.fields_schema import read_fields, xdmf_of
 from catenary.solver.waves.excitation import Excitation, MovingForce, excitation_of_facts
 

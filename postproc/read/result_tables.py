@@ -21,10 +21,10 @@ from h5py import h5f
 
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.facts import NONE
-from catenary.postproc.channels.header import Header, LineRecord
 from catenary.postproc.files.committed_rows import committed_rows, extremes_at
+from catenary.postproc.files.facts import NONE
 from catenary.postproc.files.hdf5 import HDF5_ERRORS, Damage, open_own, sum_is_kept, text_of
+from catenary.postproc.files.header import Header, LineRecord
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     DONE,

@@ -21,9 +21,9 @@ from catenary.base.errors import InputError
 from catenary.base.files import is_file, is_folder, is_there
 from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.header import LineRecord, places_on_train
 from catenary.postproc.files import hdf5
 from catenary.postproc.files.committed_rows import filtered_in
+from catenary.postproc.files.header import LineRecord, places_on_train
 from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
 from catenary.postproc.read.registration import Registration
@@ -342,7 +342,7 @@ class Results(TrainOfRun):
         return self.fact("time_step")
 
     def fact(self, name: str) -> float:
-        """A fact of ``postproc.channels.facts``, NaN if the file was written without it.
+        """A fact of ``postproc.files.facts``, NaN if the file was written without it.
 
         Of the run as a whole: see ``facts_of`` and ``facts_of_wires`` for others.
         """

@@ -15,7 +15,6 @@ import h5py
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from catenary.postproc.channels.header import LineRecord
 from catenary.postproc.files.committed_rows import committed_rows
 from catenary.postproc.files.hdf5 import (
     ATTRIBUTE_SUMS,
@@ -27,6 +26,7 @@ from catenary.postproc.files.hdf5 import (
     text_of,
     unwritten,
 )
+from catenary.postproc.files.header import LineRecord
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     CLOCKS,

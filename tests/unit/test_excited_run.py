@@ -23,12 +23,11 @@ from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, 
 from catenary.cases.studies.waves.study import Watch, excitation_of, study_waves, without_train
 from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.run_schema import RunAttributes
-from catenary.postproc.film import animate
+from catenary.postproc.film import animate, open_in_paraview
 from catenary.postproc.film.drawing import RingingChart
 from catenary.postproc.film.film_data import Snapshots, film_data
 from catenary.postproc.film.options import FilmOptions
 from catenary.postproc.film.scenery import Scenery
-from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report

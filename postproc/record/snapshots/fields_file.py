@@ -34,12 +34,12 @@ from catenary.postproc.files.disk import (
 )
 from catenary.postproc.files.disk_errors import reason
 from catenary.postproc.files.hdf5 import Damage, open_own, put_array, set_attribute
-from catenary.postproc.record.snapshots.contents import Block
-from catenary.postproc.record.snapshots.field_layout import (
+from catenary.postproc.record.snapshots.contents import (
     FORMAT,
     PLACES,
     RESTS_BEYOND,
     SIZES,
+    Block,
     FieldRecord,
     Slots,
     layout_of,

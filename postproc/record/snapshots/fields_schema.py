@@ -19,8 +19,16 @@ from catenary.postproc.files import xdmf
 from catenary.postproc.files.hdf5 import HDF5_ERRORS, Damage
 from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, count_table, largest
 from catenary.postproc.read.validation import read_attributes, table_values
-from catenary.postproc.record.snapshots.contents import FIXED, KINDS, OTHER_PARTS, FieldKind
-from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, SIZES, BlockTables
+from catenary.postproc.record.snapshots.contents import (
+    FIXED,
+    FORMAT,
+    KINDS,
+    OTHER_PARTS,
+    PLACES,
+    SIZES,
+    BlockTables,
+    FieldKind,
+)
 
 # More snapshots or pantographs' numbers than any run has; nothing larger is read.
 _MOST_SNAPSHOTS, _MOST_PARTS, _MOST_PLACES = 10**7, 10**4, 10**6

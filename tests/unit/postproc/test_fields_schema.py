@@ -16,7 +16,7 @@ from studies import few
 from catenary import InputError
 from catenary.postproc.files.hdf5 import Damage
 from catenary.postproc.film.film_data import Snapshots
-from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.postproc.record.snapshots.contents import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.postproc.record.snapshots.fields_schema import read_fields
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from studies import few
 
-from catenary.postproc.channels.header import GZIP, LineRecord, record_words
 from catenary.postproc.evaluate import statistics
+from catenary.postproc.files.header import GZIP, LineRecord, record_words
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.time_loop.views.channels import TrainLayout, line_channels_of_all

@@ -20,10 +20,10 @@ from studies import few
 from watched_fields import blocks_at
 
 from catenary import RunBroken
+from catenary.postproc.film import open_in_paraview
 from catenary.postproc.film.film_data import Snapshots, film_data
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import MOTIONS
-from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 
@@ -175,7 +175,7 @@ def test_a_full_disk_ends_with_a_sentence(folder: Path) -> None:
     """And not with a crash: HDF5 would write again at the end of the program."""
     script = (
         "import resource, sys\nfrom pathlib import Path\n"
-        "from catenary.postproc.paraview.open_in_paraview import write_script\n"
+        "from catenary.postproc.film.open_in_paraview import write_script\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, resource.RLIM_INFINITY))\n"
         "write_script(Path(sys.argv[1]), None)"
     )
