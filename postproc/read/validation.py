@@ -279,24 +279,21 @@ def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) 
     """Number of the first ``n_rows`` rows of a table before one that cannot be read, or holds
     infinity, more than ``most``, or NaN unless it ``may_be_nan``."""
     n_columns = int(np.prod(table.shape[1:]))
-    chunk, start = table.chunks[0] if table.chunks else 1, 0
-    try:
-        for part in row_blocks(n_rows, min(n_columns, COLUMNS_AT_ONCE), chunk):
-            start = part.start
-            bad = _invalid(table, part, n_columns, most, may_be_nan)
-            if bad.any():
-                return start + int(bad.argmax())
-        return n_rows
-    except HDF5_ERRORS:
-        pass  # somewhere in this block
-    for first in range(start, n_rows, chunk):
-        part = slice(first, min(first + chunk, n_rows))
+    chunk = table.chunks[0] if table.chunks else 1
+    parts = list(row_blocks(n_rows, min(n_columns, COLUMNS_AT_ONCE), chunk))
+    while parts:
+        part = parts.pop(0)
         try:
             bad = _invalid(table, part, n_columns, most, may_be_nan)
         except HDF5_ERRORS:
-            return first
+            if part.stop - part.start <= chunk:
+                return part.start
+            # Somewhere in this block, which is read again chunk by chunk.
+            begins = range(part.start, part.stop, chunk)
+            parts[:0] = [slice(first, min(first + chunk, part.stop)) for first in begins]
+            continue
         if bad.any():
-            return first + int(bad.argmax())
+            return part.start + int(bad.argmax())
     return n_rows
 
 
