@@ -99,7 +99,7 @@ def test_nothing_continues_a_blow_as_a_run_of_its_train(struck: tuple[Path, Wave
 def test_paraview_shows_a_blow_without_a_train(struck: tuple[Path, WavesSeen]) -> None:
     script, *files = open_in_paraview.write_script(struck[0], None)
     names = {path.name for path in files}
-    assert names == {"pantographs.xdmf", "forces.xdmf", "track.xdmf"}
+    assert names == {"line.xdmf", "pantographs.xdmf", "forces.xdmf", "track.xdmf"}
     assert '"train": ""' in script.read_text()
 
 
