@@ -211,7 +211,7 @@ setup(
         ],
         "catenary.postproc": [
             "report/templates/*",
-            "paraview/*.template",
+            "film/*.template",
             "standards/books/*.toml",
         ],
         "catenary.solver": ["kernels/simulation/catenary.h"],

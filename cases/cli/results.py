@@ -286,7 +286,7 @@ def paraview(
     """Serial."""
     import shutil
 
-    from catenary.postproc.paraview.open_in_paraview import PROGRAM, write_script, write_state
+    from catenary.postproc.film.open_in_paraview import PROGRAM, write_script, write_state
 
     records = records_of(folder)
     script, *others = write_script(folder, records, motion, _shapes(folder, records), view)

@@ -7,7 +7,7 @@ import errno
 import logging
 import os
 import stat
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -174,17 +174,15 @@ def check_size(folder: Path, size: RunSize, force: bool) -> None:
     InputError
         Unless ``force`` is given.
     """
-    room = free_bytes(folder) + _replaced_bytes(folder)
-    takes = _takes(folder, size, room)
+    room = free_bytes(folder) + _bytes_of_run(folder, replaced=True)
+    takes = _check_room(folder, size, room, force)
     beyond = size.n_bytes > MOST_BYTES or size.seconds > MOST_SECONDS or size.n_steps > MOST_STEPS
-    if not force:
-        _refuse_without_room(takes, size, room, "record less, ")
-        if beyond:
-            raise InputError(
-                f"the run is very large: {takes}; beyond {volume(MOST_BYTES)}, "
-                f"{duration(MOST_SECONDS)} or {MOST_STEPS} steps give {force_option()} to run it "
-                "all the same"
-            )
+    if beyond and not force:
+        raise InputError(
+            f"the run is very large: {takes}; beyond {volume(MOST_BYTES)}, "
+            f"{duration(MOST_SECONDS)} or {MOST_STEPS} steps give {force_option()} to run it "
+            "all the same"
+        )
     if beyond or size.n_bytes > LARGE or size.seconds > LONG:
         logger.info(takes)
 
@@ -201,9 +199,8 @@ def check_room_to_continue(folder: Path, size: RunSize, force: bool) -> None:
     InputError
         Unless ``force`` is given.
     """
-    room = free_bytes(folder) + _own_bytes(folder)
-    if not force:
-        _refuse_without_room(_takes(folder, size, room), size, room, "", other_folder=False)
+    room = free_bytes(folder) + _bytes_of_run(folder)
+    _check_room(folder, size, room, force, advice="")
 
 
 def check_room_of_runs(folder: Path, folders: Iterable[Path], size: RunSize, force: bool) -> None:
@@ -221,28 +218,26 @@ def check_room_of_runs(folder: Path, folders: Iterable[Path], size: RunSize, for
         Unless ``force`` is given.
     """
     there = next(path for path in (folder, *folder.absolute().parents) if path.is_dir())
-    room = free_bytes(there) + sum(_replaced_bytes(each) for each in folders)
-    if not force:
-        _refuse_without_room(_takes(folder, size, room), size, room, "record less, ")
+    room = free_bytes(there) + sum(_bytes_of_run(each, replaced=True) for each in folders)
+    _check_room(folder, size, room, force)
 
 
-def _takes(folder: Path, size: RunSize, room: float) -> str:
-    return (
+def _check_room(
+    folder: Path, size: RunSize, room: float, force: bool, advice: str | None = None
+) -> str:
+    """What runs take, in words; InputError if that is more than the ``room`` [bytes], unless
+    ``force`` is given."""
+    takes = (
         f"{size.n_steps} steps take about {duration(size.seconds)} and {volume(size.n_bytes)} in "
         f"{folder}, where {volume(room)} are free"
     )
-
-
-def _refuse_without_room(
-    takes: str, size: RunSize, room: float, less: str, *, other_folder: bool = True
-) -> None:
-    if size.n_bytes <= room:
-        return
-    elsewhere = f"{another_folder()}, " if other_folder else ""
-    raise InputError(
-        f"there is no room for the results: {takes}; free some space, {elsewhere}{less}or give "
-        f"{force_option()} to run until the disk is full"
-    )
+    if not force and size.n_bytes > room:
+        advice = f"{another_folder()}, record less, " if advice is None else advice
+        raise InputError(
+            f"there is no room for the results: {takes}; free some space, {advice}or give "
+            f"{force_option()} to run until the disk is full"
+        )
+    return takes
 
 
 def free_bytes(folder: Path) -> float:
@@ -254,20 +249,15 @@ def free_bytes(folder: Path) -> float:
     return float(found.f_bavail) * found.f_frsize
 
 
-def _replaced_bytes(folder: Path) -> float:
-    """Blocks on the disk of the files that a new run removes [bytes]."""
-    return sum(512.0 * one.st_blocks for one in _run_files(folder) if one.st_nlink == 1)
-
-
-def _own_bytes(folder: Path) -> float:
-    """Blocks on the disk of the files that a continued run goes on with [bytes]."""
-    return sum(512.0 * one.st_blocks for one in _run_files(folder))
-
-
-def _run_files(folder: Path) -> Iterator[os.stat_result]:
+def _bytes_of_run(folder: Path, replaced: bool = False) -> float:
+    """Blocks on the disk of the files of a run, or of those that a new run frees when it replaces
+    them [bytes]."""
+    total = 0.0
     for name in (RUN_FILE, *FIELD_FILES):
         with contextlib.suppress(OSError):
-            yield (folder / name).lstat()
+            one = (folder / name).lstat()
+            total += 512.0 * one.st_blocks * (one.st_nlink == 1 or not replaced)
+    return total
 
 
 def _is_hdf5(path: Path) -> bool:

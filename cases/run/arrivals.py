@@ -19,8 +19,8 @@ from catenary.cases.scene.scene import Scene, problem_of
 from catenary.meshgen.line import Line
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of, wave_of_two_spans
 from catenary.meshgen.wires import Wire
-from catenary.postproc.channels.header import in_sentence, places_on_train
 from catenary.postproc.evaluate.wording import capital, counted
+from catenary.postproc.files.header import in_sentence, places_on_train
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Periodic
 from catenary.solver.problem.problem import Problem

@@ -24,9 +24,9 @@ from catenary.cases.terminal.terminal_text import static_text
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import End
-from catenary.postproc.channels.header import line_datasets, static_datasets
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.csv_text import csv_text
+from catenary.postproc.files.header import line_datasets, static_datasets
 from catenary.postproc.read.registration import Registration
 from catenary.postproc.report.study_table import json_text
 from catenary.solver.effects.all_effects import with_defects

@@ -19,9 +19,9 @@ from catenary.base.options import option
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.load import scene_from
 from catenary.cases.scene.scene import Scene, resolved
-from catenary.postproc.channels.header import Header
 from catenary.postproc.files.committed_rows import fault_to_continue
 from catenary.postproc.files.hdf5 import open_own
+from catenary.postproc.files.header import Header
 from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results

@@ -12,8 +12,8 @@ from catenary.cases.run.description import defect_facts, header_words, incident_
 from catenary.cases.run.plan import effect_rows
 from catenary.cases.scene.run.case import rule_entries
 from catenary.cases.scene.scene import Scene, resolved
-from catenary.postproc.channels.facts import facts_of
-from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
+from catenary.postproc.files.facts import facts_of
+from catenary.postproc.files.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.form_finding import lengths_to_cut
 from catenary.solver.statics.line_at_rest import LineAtRest

@@ -32,8 +32,8 @@ from catenary.cases.scene.checks.mesh_size import estimate_march, estimate_memor
 from catenary.cases.scene.scene import Scene, problem_of, resolved
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import LineMesh
-from catenary.postproc.channels.header import GZIP
-from catenary.postproc.files.chunk_shapes import Chunk, chunks_of
+from catenary.postproc.files.header import GZIP
+from catenary.postproc.files.run_schema import Chunk, chunks_of
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import numbering_of
 from catenary.solver.integrators.slow_path import SlowPath, single_steps_of, slow_path_of

@@ -11,9 +11,12 @@ from catenary.mbs.build import has_joints
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.header import GZIP, NONE, LineRecord, record_words
-from catenary.postproc.record.snapshots.contents import USUAL_FIELDS
-from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.postproc.files.header import GZIP, NONE, LineRecord, record_words
+from catenary.postproc.record.snapshots.contents import (
+    USUAL_FIELDS,
+    Course,
+    FieldRecord,
+)
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.effects.shipped.axial_effects import moves_along
 from catenary.solver.model.gauges import gauge_places

@@ -39,8 +39,8 @@ from catenary.cases.run.recording import FIELD_EVERY, extent_of, recording_of
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.meshgen.mesh import LineMesh
-from catenary.postproc.channels.header import Header
 from catenary.postproc.files.committed_rows import ForceFilter
+from catenary.postproc.files.header import Header
 from catenary.postproc.files.own_files import RUN_FILE, remove_stale
 from catenary.postproc.files.result_file import BEGUN_FOR, CHANGED, extend_run
 from catenary.postproc.record.progress import Progress

@@ -21,12 +21,12 @@ from catenary.cases.run.header import header_of, scene_attributes, train_attribu
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.keys.keys import OF_THE_TRAIN
 from catenary.cases.scene.scene import Scene, problem_of, resolved
-from catenary.postproc.channels.facts import facts_of
-from catenary.postproc.channels.header import Header, static_datasets
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.verdict import criteria_of
 from catenary.postproc.files.committed_rows import FILTERED_FORCE
+from catenary.postproc.files.facts import facts_of
+from catenary.postproc.files.header import Header, static_datasets
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.read.result_tables import MarchedFile
 from catenary.postproc.read.results import Results

@@ -43,9 +43,9 @@ from catenary.meshgen.line import DropperKind, Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
 from catenary.meshgen.wires import Role, Wire
-from catenary.postproc.channels.header import in_sentence
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.wording import stiffness_words, wire_words
+from catenary.postproc.files.header import in_sentence
 from catenary.postproc.files.own_files import PICTURES
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.page import (

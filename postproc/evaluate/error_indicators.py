@@ -18,9 +18,9 @@ from scipy import optimize, signal
 from catenary.base.errors import InputError
 from catenary.meshgen.slowest_wave import bends
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.facts import FACTS, WIRE
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import evaluated_force
+from catenary.postproc.files.facts import FACTS, WIRE
 from catenary.postproc.read.results import Results
 from catenary.solver.model import beam
 from catenary.solver.problem.integrator_parameters import AVERAGE_ACCELERATION, Integration

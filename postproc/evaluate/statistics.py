@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.postproc.channels.header import in_sentence
 from catenary.postproc.evaluate import filters
+from catenary.postproc.files.header import in_sentence
 from catenary.postproc.read.results import Results, in_stretch
 
 SHORTEST_ARC = 5e-3

@@ -1,1 +1,1 @@
-"""Files of results: their layout, and how they are kept whole."""
+"""Files of results: what they hold of a run, their layout, and how they are kept whole."""

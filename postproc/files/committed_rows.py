@@ -26,7 +26,7 @@ from catenary.postproc.files.dimensions import describe_extremes, describe_filte
 from catenary.postproc.files.disk import MARGIN, NoRoom, reserve
 from catenary.postproc.files.hdf5 import (
     HDF5_ERRORS,
-    DamagedClock,
+    Damage,
     column,
     create_checked,
     open_own,
@@ -98,7 +98,7 @@ def fault_to_continue(path: Path, time: float) -> str:
     with open_own(path, locking=False) as file:
         try:
             kept = _rows_to_keep(file, time)
-        except DamagedClock as error:
+        except Damage as error:
             return str(error)
         for rows, paths in zip(kept, _tables_by_clock(file), strict=True):
             for table_path in paths:

@@ -3,8 +3,7 @@
 xarray and other readers of netCDF-4 then show time, places and units. A dimension is a dataset of
 the root group, which HDF5 calls a dimension scale: with values where these are places, numbers or
 the time, else of its size alone. Everything is written with the head of the file: attached tables
-may grow, and no flush writes anything here. Tables are handled by HDF5's identifiers: to make an
-object of h5py of each took half of the time. Not collective.
+may grow, and no flush writes anything here. Not collective.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5ds, h5s
+from h5py import h5d, h5ds
 
 from catenary.postproc.files.hdf5 import create_checked, set_attribute
 from catenary.postproc.files.run_schema import (
@@ -41,7 +40,7 @@ _COUNTED = {
 # root's ``time``, which they would otherwise share.
 _ROWS = {"channels": "time", "line_channels": "line_row", "energy": "energy_row"}
 # Name of netCDF-4 for a scale that is a size and has no values.
-_SIZE = b"This is a netCDF dimension but not a netCDF variable. %10d"
+_SIZE = "This is a netCDF dimension but not a netCDF variable. %10d"
 
 
 def describe(file: h5py.File, places: dict[str, np.ndarray]) -> None:
@@ -55,9 +54,8 @@ def describe(file: h5py.File, places: dict[str, np.ndarray]) -> None:
         Places along the track of the recorded columns, (recorded,), by what a column stands
         for [m].
     """
-    time = _table(file, "time")
-    h5ds.set_scale(time, b"time")
-    _describe(time, channels.TIME.unit, channels.TIME.meaning)
+    file["time"].make_scale("time")
+    _describe(file["time"], channels.TIME.unit, channels.TIME.meaning)
     for name, own in PLACES.items():
         if own in file:
             _add_places(file, name, file[own][...])
@@ -67,19 +65,19 @@ def describe(file: h5py.File, places: dict[str, np.ndarray]) -> None:
     tables = constant_tables(file["line/wires"], file.get("line/breaks", ()))
     for path, table in {COMPLETE: COUNTS, **tables, **fact_tables()}.items():
         if path in file:
-            dataset = _table(file, path)
+            dataset = file[path]
             _attach(file, dataset, table.dimensions)
             _describe(dataset, table.unit, table.meaning, table.coordinates)
     for group, rows in _ROWS.items():
         for name in file.get(group, ()):
-            dataset, channel = _table(file, f"{group}/{name}"), _channel(name)
-            columns = () if dataset.rank == 1 else (COLUMNS[channel.per],)
+            dataset, channel = file[f"{group}/{name}"], _channel(name)
+            columns = () if dataset.ndim == 1 else (COLUMNS[channel.per],)
             _attach(file, dataset, (rows, *columns))
             clock = "time" if rows != "time" and name != "time" else ""
             _describe(dataset, channel.unit, channel.meaning, clock)
 
 
-def describe_extremes(file: h5py.File, dataset: h5d.DatasetID, name: str) -> None:
+def describe_extremes(file: h5py.File, dataset: h5py.Dataset, name: str) -> None:
     """Name the dimensions of a new table (2, columns) of the extremes of a channel."""
     channel = _channel(name)
     _attach(file, dataset, ("smallest_largest", ALL_COLUMNS[channel.per]))
@@ -89,7 +87,7 @@ def describe_extremes(file: h5py.File, dataset: h5d.DatasetID, name: str) -> Non
 def describe_filtered(dataset: h5py.Dataset) -> None:
     """Name the dimensions of a new table (n, n_pantographs) of filtered contact forces."""
     channel = _channel("contact_force")
-    _attach(dataset.file, dataset.id, ("time", COLUMNS[channel.per]))
+    _attach(dataset.file, dataset, ("time", COLUMNS[channel.per]))
     _describe(dataset, channel.unit, f"filtered {channel.meaning}", "time")
 
 
@@ -97,15 +95,12 @@ def hide(group: h5py.Group) -> None:
     """Mark tables of a state to continue from as mere dimensions for readers of netCDF-4.
 
     They need a name for each dimension of each table; whatever else a state holds is not for them.
+    A flush looks at all of them, by HDF5's own calls.
     """
     for name in group:
-        dataset = _table(group, name)
+        dataset = h5d.open(group.id, name.encode())
         if dataset.rank and not h5ds.is_scale(dataset):
-            h5ds.set_scale(dataset, _SIZE % dataset.shape[0])
-
-
-def _table(group: h5py.Group, path: str) -> h5d.DatasetID:
-    return h5d.open(group.id, path.encode())
+            h5ds.set_scale(dataset, (_SIZE % dataset.shape[0]).encode())
 
 
 def _channel(name: str) -> Channel:
@@ -113,9 +108,7 @@ def _channel(name: str) -> Channel:
     return known[name]
 
 
-def _describe(
-    dataset: h5py.Dataset | h5d.DatasetID, unit: str, meaning: str, coordinates: str = ""
-) -> None:
+def _describe(dataset: h5py.Dataset, unit: str, meaning: str, coordinates: str = "") -> None:
     """Unit and meaning under the names of CF, whose unit of a mere number is 1."""
     set_attribute(dataset, "units", "1" if unit == "-" else unit)
     set_attribute(dataset, "long_name", meaning)
@@ -123,27 +116,26 @@ def _describe(
         set_attribute(dataset, "coordinates", coordinates)
 
 
+def _add_values(file: h5py.File, name: str, values: np.ndarray, unit: str, meaning: str) -> None:
+    """Make a scale with values."""
+    made = create_checked(file, name, values)
+    made.make_scale(name)
+    _describe(made, unit, meaning)
+
+
 def _add_places(file: h5py.File, name: str, x: np.ndarray) -> None:
-    made = create_checked(file, name, x)
-    h5ds.set_scale(made.id, name.encode())
-    _describe(made, "m", f"position along the track of each {name.replace('_', ' ')}")
+    words = f"position along the track of each {name.replace('_', ' ')}"
+    _add_values(file, name, x, "m", words)
 
 
-def _attach(file: h5py.File, dataset: h5d.DatasetID, names: tuple[str, ...]) -> None:
+def _attach(file: h5py.File, dataset: h5py.Dataset, names: tuple[str, ...]) -> None:
     """Name the dimensions of a table; scales that are not there are made with its sizes."""
-    most = dataset.get_space().get_simple_extent_dims(True)
-    for axis, name in enumerate(names):
-        if name.encode() not in file.id:
-            _add(file, name, dataset.shape[axis], most[axis] == h5s.UNLIMITED)
-        h5ds.attach_scale(dataset, _table(file, name), axis)
-
-
-def _add(file: h5py.File, name: str, size: int, grows: bool) -> None:
-    if name in _COUNTED:
-        made = create_checked(file, name, np.arange(1, size + 1))
-        h5ds.set_scale(made.id, name.encode())
-        _describe(made, "-", _COUNTED[name])
-        return
-    open_end: dict[str, Any] = {"maxshape": (None,), "chunks": (1,)} if grows else {}
-    made = file.create_dataset(name, shape=(size,), dtype="f4", **open_end)
-    h5ds.set_scale(made.id, _SIZE % size)
+    for axis, (name, size, most) in enumerate(
+        zip(names, dataset.shape, dataset.maxshape, strict=True)
+    ):
+        if name not in file and name in _COUNTED:
+            _add_values(file, name, np.arange(1, size + 1), "-", _COUNTED[name])
+        elif name not in file:
+            grows: dict[str, Any] = {"maxshape": (None,), "chunks": (1,)} if most is None else {}
+            file.create_dataset(name, (size,), "f4", **grows).make_scale(_SIZE % size)
+        dataset.dims[axis].attach_scale(file[name])

@@ -25,10 +25,7 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.files import appears_whole, new_part
-from catenary.postproc.channels.facts import FACTS
-from catenary.postproc.channels.header import GZIP, GZIP_LEVEL, Header, LineRecord
 from catenary.postproc.files import dimensions
-from catenary.postproc.files.chunk_shapes import Chunk, chunks_of, room_of
 from catenary.postproc.files.committed_rows import (
     SLOTS,
     ForceFilter,
@@ -50,6 +47,7 @@ from catenary.postproc.files.disk import (
     trimmed,
 )
 from catenary.postproc.files.disk_errors import reason
+from catenary.postproc.files.facts import FACTS
 from catenary.postproc.files.hdf5 import (
     ATTRIBUTE_SUMS,
     FORMAT_BOUNDS,
@@ -64,13 +62,17 @@ from catenary.postproc.files.hdf5 import (
     text_of,
     write_window,
 )
+from catenary.postproc.files.header import GZIP, GZIP_LEVEL, Header, LineRecord
 from catenary.postproc.files.run_schema import (
     COMPLETE,
     FORMAT,
     INTERRUPTED,
     LINE_TIME,
     RUNNING,
+    Chunk,
+    chunks_of,
     growing_tables,
+    room_of,
 )
 from catenary.solver.time_loop.views import channels
 from catenary.solver.time_loop.views.channels import Channel
@@ -354,7 +356,7 @@ def _write_head(
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "n_steps_planned": stage.n_steps,
         "n_strips": list(stage.train.n_strips),
-        "line_record": record.as_table(),
+        "line_record": record.model_dump(by_alias=True),
     }
     for name, value in {**header.attributes, **fixed}.items():
         set_attribute(file, name, as_attribute(value))

@@ -2,12 +2,17 @@
 
 ``result_file`` and ``dimensions`` write by these declarations, ``read.result_tables`` reads
 against them.
+
+Tables that grow do so by chunks, and a flush fills whole ones. A chunk is written once: a kill in
+the midst of writing one spoils no checksum of earlier rows. Of long chunks a column of a pantograph
+has its own, because it is read alone. Of the line's channels a chunk holds neighbouring columns:
+those that are far from the train take no room if a window is recorded.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, NamedTuple, NotRequired
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -15,9 +20,9 @@ from typing_extensions import TypedDict
 
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.facts import FACTS
-from catenary.postproc.channels.facts import WIRE as CONTACT_WIRE
-from catenary.postproc.channels.header import LineRecord, from_table
+from catenary.postproc.files.facts import FACTS
+from catenary.postproc.files.facts import WIRE as CONTACT_WIRE
+from catenary.postproc.files.header import GZIP, LineRecord
 from catenary.postproc.standards.rule_books import (
     DEFAULT,
     LIMIT_KEYS,
@@ -66,16 +71,6 @@ def read_by(read: Callable[[Any], object]) -> AfterValidator:
         return value
 
     return AfterValidator(check)
-
-
-def _read_line_record(table: Any) -> None:
-    record = from_table(table)
-    ends = [*(record.window or ()), *(record.stretch or ())]
-    known = set(channels.line_channels())
-    if not (1 <= record.every <= 10**9 and all(map(math.isfinite, ends))):
-        raise ValueError("cadence or places")
-    if not set(record.names) <= known:
-        raise ValueError("channels")
 
 
 def _read_watched(table: dict[str, Any]) -> None:
@@ -135,7 +130,7 @@ _Effects = Annotated[
 class RunAttributes(BaseModel):
     """The root attributes; ``description`` is how an error names a valid value.
 
-    Those without a default are needed for a report; others take it where they are damaged.
+    Those without a default are needed for a report; others take it where they are missing.
     """
 
     model_config = ConfigDict(strict=True, defer_build=True)
@@ -199,7 +194,7 @@ class RunAttributes(BaseModel):
     n_strips: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], JSON] = Field(
         default=[], description="a list of whole numbers"
     )
-    line_record: Annotated[dict[str, Any], JSON, read_by(_read_line_record)] = Field(
+    line_record: Annotated[LineRecord, JSON] = Field(
         default=MISSING, description="what is recorded of the line"
     )
     detour: Text = ""
@@ -372,3 +367,91 @@ def growing_tables(
     of_line = {f"line_channels/{name}": channels.CHANNELS[name] for name in record.names}
     energies = {f"energy/{c.name}": c for c in channels.ENERGIES.values()}
     return {"time": channels.TIME, **of_train}, energies, {LINE_TIME: channels.TIME, **of_line}
+
+
+# ---- chunks ------------------------------------------------------------------------------------
+
+# Largest numbers of rows of a chunk: of one column, and of a block of columns.
+_ROWS_OF_ONE, _ROWS_OF_MANY = 4096, 512
+# Shorter chunks hold all columns of a table: there would be too many of them.
+_LEAST_OF_ONE = 512
+BLOCK = 64
+
+
+class Chunk(NamedTuple):
+    """Rows and columns of a chunk."""
+
+    rows: int
+    columns: int
+
+
+def chunks_of(
+    table: Mapping[str, tuple[Channel, int]], n_steps: int, rows_per_flush: int, every: int
+) -> dict[str, Chunk]:
+    """Shapes of the chunks by path.
+
+    Parameters
+    ----------
+    table : mapping
+        Path -> channel and columns.
+    n_steps : int
+        Steps that are planned after step 0.
+    rows_per_flush : int
+        Steps of a flush.
+    every : int
+        Steps between two rows of the line's channels.
+    """
+    # Rows that are appended at once, and that are planned.
+    line = max(1, rows_per_flush // every), n_steps // every + 1
+    step = rows_per_flush, n_steps + 1
+    shapes = {}
+    for path, (channel, columns) in table.items():
+        if path.startswith("energy/"):
+            # Its rows are few, and not so many a flush.
+            shapes[path] = Chunk(min(_ROWS_OF_MANY, n_steps + 1), 1)
+        elif channel.of_line:
+            n_blocks = max(1, math.ceil(columns / BLOCK))
+            rows = _rows(*line, _ROWS_OF_MANY)
+            shapes[path] = Chunk(rows, max(1, math.ceil(columns / n_blocks)))
+        else:
+            rows = _rows(*(line if path.startswith("line_channels/") else step), _ROWS_OF_ONE)
+            shapes[path] = Chunk(rows, 1 if rows >= _LEAST_OF_ONE else max(1, columns))
+    return shapes
+
+
+def room_of(
+    table: Mapping[str, tuple[Channel, int]],
+    chunks: Mapping[str, Chunk],
+    rows: int,
+    record: LineRecord,
+) -> int:
+    """Most bytes that an append adds to a file, in whole chunks [B].
+
+    Parameters
+    ----------
+    table : mapping of str to tuple
+        Channel and number of columns by path in the file.
+    chunks : mapping of str to Chunk
+        Shapes of chunks by path.
+    rows : int
+        Number of steps that are appended.
+    record : LineRecord
+        Recorded part of the line.
+    """
+    total = 0
+    for path, (channel, columns) in table.items():
+        shape = chunks[path]
+        across = math.ceil(max(columns, 1) / shape.columns) * shape.columns
+        added = math.ceil(rows / shape.rows)
+        # The chunks that were begun move if they are compressed, or get neighbours in a window.
+        moves = record.window is not None or record.compression == GZIP
+        added += channel.of_line and moves
+        total += 8 * across * shape.rows * added
+    return total
+
+
+def _rows(per_flush: int, planned: int, most: int) -> int:
+    """The largest part of a flush with at most ``most`` rows, and not more than are planned."""
+    parts = math.ceil(per_flush / most)
+    even = next((n for n in range(parts, 4 * parts) if per_flush % n == 0), parts)
+    return max(1, min(math.ceil(per_flush / even), planned))

@@ -1,1 +1,1 @@
-"""A film of a run: the moving line and its pantographs, the contact force beneath."""
+"""A run as a film, and in ParaView: the moving line and its pantographs, the contact force."""

@@ -17,13 +17,12 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.meshgen.line import DropperPlace, droppers_at
 from catenary.postproc.evaluate import filters
-from catenary.postproc.files.hdf5 import open_own
+from catenary.postproc.files.hdf5 import Damage, open_own
 from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.snapshots.contents import OTHER_PARTS
-from catenary.postproc.record.snapshots.field_layout import PLACES, BlockTables
-from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
+from catenary.postproc.record.snapshots.contents import OTHER_PARTS, PLACES, BlockTables
+from catenary.postproc.record.snapshots.fields_schema import read_fields, xdmf_of
 from catenary.solver.waves.excitation import Excitation, MovingForce, excitation_of_facts
 
 # Defects and incidents after which a dropper is not there.
@@ -261,13 +260,14 @@ class Snapshots:
         path, file = self._path, self._file
         try:
             tables = read_fields(file)
-        except FieldsFault as error:
+        except Damage as error:
             if "uplift" in file:
                 raise InputError(
                     f"{path} was written by an earlier version of Catenary; run the scene again"
                 ) from error
             raise InputError(f"{path} is damaged: {error}") from error
         self.times = tables.times[tables.times <= self._until + _SAME_TIME]
+        self._tables = tables._replace(times=self.times)
         if self.times.size < 2:
             raise InputError(
                 f"{path} has fewer than two snapshots; if its run has just begun, wait for more"
@@ -300,6 +300,10 @@ class Snapshots:
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self._file.close()
+
+    def xdmf(self, path: str) -> str:
+        """XDMF of the snapshots, whose file is at ``path`` beside the text."""
+        return xdmf_of(self._file, self._tables, path)
 
     def block(self, name: str) -> BlockTables:
         """Points of a part of the line that is no wire, and the nodes that they move with."""

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.postproc.channels.header import in_sentence
 from catenary.postproc.evaluate.compare import STATISTICS, differences, span_sums
 from catenary.postproc.evaluate.wording import counted
+from catenary.postproc.files.header import in_sentence
 from catenary.postproc.measurements.alignment import (
     CERTAIN,
     LEAST_PERIODS,

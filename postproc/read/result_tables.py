@@ -21,10 +21,10 @@ from h5py import h5f
 
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.facts import NONE
-from catenary.postproc.channels.header import Header, LineRecord, from_table
 from catenary.postproc.files.committed_rows import committed_rows, extremes_at
-from catenary.postproc.files.hdf5 import HDF5_ERRORS, open_own, sum_is_kept, text_of
+from catenary.postproc.files.facts import NONE
+from catenary.postproc.files.hdf5 import HDF5_ERRORS, Damage, open_own, sum_is_kept, text_of
+from catenary.postproc.files.header import Header, LineRecord
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     DONE,
@@ -33,18 +33,17 @@ from catenary.postproc.files.run_schema import (
     RunAttributes,
     constant_tables,
     fact_tables,
-    growing_tables,
 )
 from catenary.postproc.read.validation import (
     Records,
+    check_tables,
+    check_values,
     is_there,
     listed,
     names_in,
     read_attributes,
     scan,
-    table_faults,
     table_values,
-    values_fault,
 )
 from catenary.solver.time_loop.views import channels
 
@@ -58,8 +57,6 @@ _CACHE = 128 << 20
 Complete = tuple[list[int], str]
 # Facts without which there is no report; others may have been declared after a file was written.
 _ESSENTIAL_FACTS = ("time_step", "speed", "wave_speed")
-# Attributes that name the rules by which a run is judged; a report needs one of them.
-_RULES = ('its attribute "rules"', 'its attribute "edition"')
 
 
 def opened(path: Path) -> tuple[h5py.File, Complete | None]:
@@ -158,22 +155,18 @@ class ValidatedFile:
         self._refuse_other_format()
         self.sizes: dict[str, int] = {}
         self.facts: dict[str, np.ndarray] = {}
-        self.attrs, fatal, self._partial = read_attributes(self._file, RunAttributes)
-        if not (self.attrs.get("rules") or self.attrs.get("edition")):
-            own = [f for f in self._partial if f.startswith(_RULES)]
-            fatal += own or [f"{_RULES[0]} is missing"]
-        known = self.attrs.get("line_record")
-        self.record = LineRecord() if known is None else from_table(known)
-        fatal += [*self._read_facts(), *self._constant_faults()]
-        most = self.attrs.get("n_steps_planned", 10**12) + 1
-        self._faults = table_faults(self._file, self.record, self.sizes, most)
-        steps = growing_tables(self.record)[0]
-        essential = {"time", *(path for path, own in steps.items() if own.essential)}
-        unusable = [f"{p} {clause}" for p, clause in self._faults.items() if p in essential]
-        fatal += [] if fatal else unusable or self._misfits()
-        if fatal:
-            usable = "no part of it can be reported" if unusable else self._usable()
-            raise InputError(f"{self.path} is damaged: {listed(fatal)}; {usable}")
+        try:
+            self.attrs = read_attributes(self._file, RunAttributes)
+            if not (self.attrs.get("rules") or self.attrs.get("edition")):
+                raise Damage('its attribute "rules" is missing')
+            known = self.attrs.get("line_record")
+            self.record = LineRecord.model_validate(known or {})
+            self._read_facts()
+            self._check_constants()
+            check_tables(self._file, self.record, self.sizes, self.attrs["n_steps_planned"] + 1)
+            self._check_fit()
+        except Damage as error:
+            raise InputError(f"{self.path} is damaged: {error}; run the case again") from error
 
     def _refuse_other_format(self) -> None:
         try:
@@ -189,52 +182,48 @@ class ValidatedFile:
                 f" is {found!r}, not {FORMAT!r}"
             )
 
-    def _read_facts(self) -> list[str]:
-        """Read the facts; returns their faults."""
+    def _read_facts(self) -> None:
         try:
             group = self._file["facts"]
             read = {name: np.asarray(group[name][()]) for name in group}
             intact = sum_is_kept(group, read)
-        except HDF5_ERRORS:
-            return ["its facts are missing or cannot be read"]
+        except HDF5_ERRORS as error:
+            raise Damage("its facts are missing or cannot be read") from error
         if intact is False:
-            return ["its facts differ from their checksum"]
-        faults = []
+            raise Damage("its facts differ from their checksum")
         for path, declared in fact_tables().items():
             name = path.removeprefix("facts/")
             if name in read:
-                fault = values_fault(read[name], declared, self.sizes)
-                self.facts |= {} if fault else {name: read[name]}
-                faults += [f"{path} {fault}"] if fault else []
+                check_values(path, read[name], declared, self.sizes)
+                self.facts[name] = read[name]
             elif intact and name not in _ESSENTIAL_FACTS:
                 shape = tuple(self.sizes.get(own, 1) for own in declared.dimensions)
                 self.facts[name] = np.full(shape, NONE)
             else:
-                faults.append(f"{path} is missing or cannot be read")
-        return faults
+                raise Damage(f"{path} is missing or cannot be read")
 
-    def _constant_faults(self) -> list[str]:
-        """Faults of the tables that are written once."""
-        file, faults = self._file, []
+    def _check_constants(self) -> None:
+        """Check the tables that are written once, and what numbers in them refer to."""
+        file, largest = self._file, dict[str, int]()
         wires, breaks = names_in(file, "line/wires"), names_in(file, "line/breaks")
-        largest: dict[str, int] = {}
+        if not wires:
+            raise Damage("line/wires has no wire")
         for path, declared in constant_tables(wires, breaks).items():
             if declared.optional and not is_there(file, path):
                 continue
-            values, fault = table_values(file, path, declared, self.sizes)
-            if values is None:
-                faults.append(fault)
-            elif declared.whole and values.size:
+            values = table_values(file, path, declared, self.sizes)
+            if declared.whole and values.size:
                 largest[path] = int(values.max())
-        if not wires:
-            faults.append("line/wires has no wire")
-        return faults or self._references(largest, wires)
+        for path, limit in self._limits(wires).items():
+            if largest.get(path, -1) >= limit:
+                raise Damage(f"{path} names number {largest[path]} of {limit}")
+        x = file["static/contact_x"][...]
+        start, end = file["line/evaluation_range"][...]
+        if start >= x.max() or end <= x.min():
+            raise Damage("line/evaluation_range lies beyond the contact wires")
 
-    def _references(self, largest: dict[str, int], wires: list[str]) -> list[str]:
-        """Faults of numbers of nodes, wires, spans and columns: beyond the number that there are.
-
-        ``largest`` is the largest number in each table.
-        """
+    def _limits(self, wires: list[str]) -> dict[str, int]:
+        """How many nodes, wires, spans and columns there are for the numbers in each table."""
         sizes = self.sizes
         limits = {
             "line/droppers": sizes["node"],
@@ -248,39 +237,23 @@ class ValidatedFile:
         for name in channels.line_channels():
             of_all = ALL_COLUMNS[channels.CHANNELS[name].per]
             limits[f"line_columns/{name}"] = sizes.get(of_all, 0)
-        faults = [
-            f"{path} names number {largest[path]} of {limit}"
-            for path, limit in limits.items()
-            if largest.get(path, -1) >= limit
-        ]
-        if faults:
-            return faults
-        x = self._file["static/contact_x"][...]
-        start, end = self._file["line/evaluation_range"][...]
-        beyond = start >= x.max() or end <= x.min()
-        return ["line/evaluation_range lies beyond the contact wires"] if beyond else []
+        return limits
 
-    def _misfits(self) -> list[str]:
-        """Faults of tables whose sizes do not fit the numbers of pantographs, strips and wires."""
+    def _check_fit(self) -> None:
+        """Check that sizes of tables fit the numbers of pantographs, strips and wires."""
         sizes, n = self.sizes, self.sizes["pantograph"]
         if n < 1:
-            return ["channels/contact_force has no columns"]
+            raise Damage("channels/contact_force has no columns")
+        for name in ("n_strips", "pantographs"):
+            if self.attrs[name] and len(self.attrs[name]) != n:
+                raise Damage(f'its attribute "{name}" has {len(self.attrs[name])} entries for {n}')
         nodes, roles = self._file["line/wires"], self.attrs["wires"]
-        faults = [
-            f'its attribute "{name}" has {len(self.attrs[name])} entries for {n}'
-            for name in ("n_strips", "pantographs")
-            if self.attrs[name] and len(self.attrs[name]) != n
-        ]
-        faults += [
-            f"line/wires has no {name}, whose role is {role}"
-            for name, role in roles.items()
-            if name not in nodes
-        ]
+        for name, role in roles.items():
+            if name not in nodes:
+                raise Damage(f"line/wires has no {name}, whose role is {role}")
         contact = [name for name, role in roles.items() if role == Role.CONTACT.value]
         if not contact:
-            faults.append("no wire has the role of a contact wire")
-        if faults:
-            return faults
+            raise Damage("no wire has the role of a contact wire")
         n_nodes = [nodes[name].size for name in contact]
         strips = sum(self.attrs["n_strips"] or [1] * n)
         expected = {
@@ -290,44 +263,31 @@ class ValidatedFile:
             "contact": strips * len(contact),
             "contact_wire_of_pantograph": n * len(contact),
         }
-        faults = [
-            f"its tables have {sizes[name]} of {name} in place of {size}"
-            for name, size in expected.items()
-            if sizes.get(name, size) != size
-        ]
+        for name, size in expected.items():
+            if sizes.get(name, size) != size:
+                raise Damage(f"its tables have {sizes[name]} of {name} in place of {size}")
         if strips > n and "strip" not in sizes:
-            faults.append("channels/strip_force is missing")
-        if faults:
-            return faults
+            raise Damage("channels/strip_force is missing")
         x = np.split(self._file["static/contact_x"][...], np.cumsum(n_nodes)[:-1])
-        ascend = all(own.size > 1 and (np.diff(own) > 0.0).all() for own in x)
-        return [] if ascend else ["static/contact_x does not ascend"]
-
-    def _usable(self) -> str:
-        """A clause on the records that can be read where no report can be made."""
-        dt = float(self.facts.get("time_step", np.nan))
-        if not dt > 0.0:
-            return "no part of it can be reported"
-        about = {"n_steps": None, "outcome": RUNNING, **self.attrs}
-        last = scan(self._file, about, self.record, dt, self._faults, self._complete).last
-        return f"{_up_to(last)} and can be read with h5py"
+        if not all(own.size > 1 and (np.diff(own) > 0.0).all() for own in x):
+            raise Damage("static/contact_x does not ascend")
 
     @cached_property
     def records(self) -> Records:
         """Valid records of the file."""
         dt = float(self.facts["time_step"])
-        return scan(self._file, self.attrs, self.record, dt, self._faults, self._complete)
+        return scan(self._file, self.attrs, self.record, dt, self._complete)
 
     @property
     def damage(self) -> list[str]:
         """A sentence that names the file's damage and what is used of it, none if it is valid."""
-        damage = [*self._partial, *self.records.faults]
-        if not damage:
+        if not self.records.faults:
             return []
-        return [f"{self.path.name} is damaged: {listed(damage)}; {_up_to(self.records.last)}."]
+        faults = listed(self.records.faults)
+        return [f"{self.path.name} is damaged: {faults}; {_up_to(self.records.last)}."]
 
     def __contains__(self, path: str) -> bool:
-        return path not in self._faults and is_there(self._file, path)
+        return is_there(self._file, path)
 
     def __getitem__(self, path: str) -> Any:
         try:
@@ -337,8 +297,8 @@ class ValidatedFile:
 
     @property
     def has_energies(self) -> bool:
-        """Whether the energies were recorded and are valid."""
-        return "energy" in self and not any(path.startswith("energy/") for path in self._faults)
+        """Whether the energies were recorded."""
+        return "energy" in self
 
     def close(self) -> None:
         """Close the file."""
@@ -370,7 +330,7 @@ class ValidatedFile:
         for slot in self._slots():
             try:
                 state = _state_in(self._file, slot, self.records.rows[0])
-            except ValueError as error:
+            except Damage as error:
                 faults.append(f"the state in checkpoint/{slot} is damaged, {error}")
                 continue
             if faults:
@@ -387,7 +347,7 @@ class ValidatedFile:
     def read_states(self) -> None:
         """Read all states and extremes once, valid or not."""
         for slot in self._slots():
-            with contextlib.suppress(ValueError):
+            with contextlib.suppress(Damage):
                 _state_in(self._file, slot, self.records.rows[0])
         self.extremes(self.records.rows[0])
 
@@ -401,24 +361,24 @@ class ValidatedFile:
 
 
 def _state_in(file: h5py.File, slot: str, n_rows: int) -> dict[str, Any]:
-    """The state in a slot, which ``n_rows`` valid steps precede; ValueError with a clause on its
+    """The state in a slot, which ``n_rows`` valid steps precede; `Damage` with a clause on its
     fault."""
     try:
         group = file[f"checkpoint/{slot}"]
         state = {name: text_of(dataset[()]) for name, dataset in group.items()}
         intact = sum_is_kept(group, state) is not False
     except HDF5_ERRORS as error:
-        raise ValueError("it cannot be read") from error
+        raise Damage("it cannot be read") from error
     if not intact:
-        raise ValueError("it differs from its checksum")
+        raise Damage("it differs from its checksum")
     for name, values in state.items():
         if isinstance(values, (float, np.ndarray)) and not np.isfinite(values).all():
-            raise ValueError(f"{name} holds NaN or infinity")
+            raise Damage(f"{name} holds NaN or infinity")
     step = state.get("step")
     if not isinstance(step, int) or isinstance(step, bool) or step < 0:
-        raise ValueError("it has no step")
+        raise Damage("it has no step")
     if step > n_rows:
-        raise ValueError(f"it is of step {step}, and the records before it end after {n_rows}")
+        raise Damage(f"it is of step {step}, and the records before it end after {n_rows}")
     return state
 
 
@@ -473,7 +433,7 @@ class MarchedFile:
         self.damage: list[str] = []
         self.has_energies = False
         n = len(tables["time"])
-        self.records = Records([n, 0, n], {}, [], float(tables["time"][-1]) if n else float("nan"))
+        self.records = Records([n, 0, n], [], float(tables["time"][-1]) if n else float("nan"))
         self.record = LineRecord()
         n_pantographs = tables["channels/contact_force"].shape[1]
         self.attrs.setdefault("n_strips", [1] * n_pantographs)

@@ -21,9 +21,9 @@ from catenary.base.errors import InputError
 from catenary.base.files import is_file, is_folder, is_there
 from catenary.meshgen.mesh import elements_of
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.header import LineRecord, places_on_train
 from catenary.postproc.files import hdf5
 from catenary.postproc.files.committed_rows import filtered_in
+from catenary.postproc.files.header import LineRecord, places_on_train
 from catenary.postproc.files.own_files import RUN_FILE
 from catenary.postproc.files.run_schema import ALL_COLUMNS, DONE, LINE_TIME, PLACES, RUNNING
 from catenary.postproc.read.registration import Registration
@@ -342,7 +342,7 @@ class Results(TrainOfRun):
         return self.fact("time_step")
 
     def fact(self, name: str) -> float:
-        """A fact of ``postproc.channels.facts``, NaN if the file was written without it.
+        """A fact of ``postproc.files.facts``, NaN if the file was written without it.
 
         Of the run as a whole: see ``facts_of`` and ``facts_of_wires`` for others.
         """
@@ -415,37 +415,30 @@ class Results(TrainOfRun):
         """The filtered contact force (n, n_pantographs) [N], or (n,) of pantograph ``index``, and
         its filter.
 
-        None where the file has no valid one: its run is not done, or its contact force is damaged.
+        None where the file has no valid one: its run is not done, or records are damaged.
         """
-        if self._path("contact_force") in self._file.records.damaged:
-            return None
         return filtered_in(self._file, (self._length, self.n_pantographs), index)
 
     def rows(self, name: str, part: slice) -> np.ndarray:
-        """The rows ``part`` of channel ``name``, shape (rows, columns), NaN where it is damaged and
-        where the line is not recorded."""
-        n, table = len(range(*part.indices(self.n_rows(name)))), self._table(name)
+        """The rows ``part`` of channel ``name``, shape (rows, columns), NaN where the line is not
+        recorded."""
         columns, n_places = self.recorded_columns(name), self._n_places(name)
-        valid = self._valid(name, part)
-        n_valid, all_there = valid.stop - valid.start, columns.size == n_places
-        if table is not None and all_there and n_valid == n:
-            return np.asarray(table[valid])
-        whole = np.full((n, n_places), np.nan)
+        part, table = self._within(name, part), self._table(name)
+        if table is not None and columns.size == n_places:
+            return np.asarray(table[part])
+        whole = np.full((part.stop - part.start, n_places), np.nan)
         if table is not None:
-            whole[:n_valid, slice(None) if all_there else columns] = table[valid]
+            whole[:, columns] = table[part]
         return whole
 
     def column(self, name: str, index: int, part: slice | None = None) -> np.ndarray:
         """Column ``index`` of channel ``name``, all of its rows or ``part`` of them, from ``start``
         to ``stop``; NaN as in ``rows``."""
-        part = slice(0, self.n_rows(name)) if part is None else part
-        values = np.full(part.stop - part.start, np.nan)
+        part = self._within(name, part or slice(None))
         table, place = self._table(name), np.flatnonzero(self.recorded_columns(name) == index)
-        if table is not None and place.size:
-            valid = self._valid(name, part)
-            n = valid.stop - valid.start
-            values[:n] = hdf5.column(table, valid, int(place[0]))
-        return values
+        if table is None or not place.size:
+            return np.full(part.stop - part.start, np.nan)
+        return hdf5.column(table, part, int(place[0]))
 
     def blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray]]:
         """All rows of a channel in order, by blocks: which rows, and their values as ``rows``."""
@@ -464,10 +457,10 @@ class Results(TrainOfRun):
         if table is None:
             return
         numbers = self.recorded_columns(name)
-        valid, step = self._valid(name, slice(0, self.n_rows(name))), (table.chunks or (1,))[0]
+        n_rows, step = self.n_rows(name), (table.chunks or (1,))[0]
         for first in range(0, numbers.size, hdf5.COLUMNS_AT_ONCE):
             columns = slice(first, min(first + hdf5.COLUMNS_AT_ONCE, numbers.size))
-            for part in hdf5.row_blocks(valid.stop, columns.stop - first, step):
+            for part in hdf5.row_blocks(n_rows, columns.stop - first, step):
                 if not hdf5.unwritten(table, part, columns):
                     yield part, numbers[columns], np.asarray(table[part, columns])
 
@@ -493,8 +486,7 @@ class Results(TrainOfRun):
         table = self._table(name)
         if table is None or (of_line and not self.line_record.whole):
             return np.full((2, self._n_places(name)), np.nan)
-        valid = self._valid(name, slice(0, self.n_rows(name)))
-        return hdf5.extremes(table, valid.stop)
+        return hdf5.extremes(table, self.n_rows(name))
 
     def has(self, name: str) -> bool:
         """Whether a channel was recorded, and can be read."""
@@ -515,11 +507,10 @@ class Results(TrainOfRun):
             latest = self._latest = path, self._file[path]
         return latest[1]
 
-    def _valid(self, name: str, part: slice) -> slice:
-        """The rows of a part that can be read."""
+    def _within(self, name: str, part: slice) -> slice:
+        """A part of the rows of a channel that can be read."""
         start, stop, _ = part.indices(self.n_rows(name))
-        n = self._file.records.damaged.get(self._path(name), stop)
-        return slice(start, max(start, min(stop, n)))
+        return slice(start, max(start, stop))
 
     def _n_places(self, name: str) -> int:
         """Columns that a channel has if all are recorded."""

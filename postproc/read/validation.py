@@ -15,17 +15,18 @@ import h5py
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from catenary.postproc.channels.header import LineRecord
 from catenary.postproc.files.committed_rows import committed_rows
 from catenary.postproc.files.hdf5 import (
     ATTRIBUTE_SUMS,
     COLUMNS_AT_ONCE,
     HDF5_ERRORS,
+    Damage,
     broken_seals,
     row_blocks,
     text_of,
     unwritten,
 )
+from catenary.postproc.files.header import LineRecord
 from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     CLOCKS,
@@ -67,57 +68,49 @@ def names_in(file: h5py.File, path: str) -> list[str]:
         return []
 
 
-def read_attributes(
-    file: h5py.File, model: type[BaseModel]
-) -> tuple[dict[str, Any], list[str], list[str]]:
-    """Valid root attributes, faults that make the file unusable, and faults that do not.
+def read_attributes(file: h5py.File, model: type[BaseModel]) -> dict[str, Any]:
+    """Valid root attributes as Python's own values, lists and tables decoded.
 
-    Values are Python's own, lists and tables decoded. An attribute that is missing or damaged has
-    the default of ``model`` if that has one; attributes that it does not declare are taken as they
-    are.
+    One that is missing has the default of ``model`` if that has one; attributes that it does not
+    declare are taken as they are.
+
+    Raises
+    ------
+    Damage
+        If one is missing that has none, invalid, or not the sealed one.
     """
-    raw, broken = {}, set()
-    for name in set(file.attrs) - {ATTRIBUTE_SUMS}:
-        try:
-            raw[name] = text_of(file.attrs[name])
-        except HDF5_ERRORS:
-            broken.add(name)
     try:
-        broken |= set(broken_seals(file, raw))
-    except HDF5_ERRORS:
-        return {}, ["the checksums of its attributes cannot be read"], []
-    return _validated({n: value for n, value in raw.items() if n not in broken}, model, broken, raw)
-
-
-def _validated(
-    values: dict[str, Any], model: type[BaseModel], broken: Collection[str], raw: Collection[str]
-) -> tuple[dict[str, Any], list[str], list[str]]:
+        values = {name: text_of(value) for name, value in file.attrs.items()}
+    except HDF5_ERRORS as error:
+        raise Damage("one of its attributes cannot be read") from error
+    values.pop(ATTRIBUTE_SUMS, None)
+    try:
+        broken = broken_seals(file, values)
+    except HDF5_ERRORS as error:
+        raise Damage("the checksums of its attributes cannot be read") from error
+    for name in broken:
+        how = "differs from its checksum" if name in values else "is missing"
+        raise Damage(f'its attribute "{name}" {how}')
     for name in values.keys() & model.model_fields.keys():
         if JSON in model.model_fields[name].metadata:
             values[name] = _decoded(values[name])
-    wrong: set[int | str] = set()
+    _validate(values, model)
+    for name, field in model.model_fields.items():
+        if field.get_default() is not None and not field.is_required():
+            values.setdefault(name, field.get_default())
+    return values
+
+
+def _validate(values: dict[str, Any], model: type[BaseModel]) -> None:
     try:
         model.model_validate(values)
     except ValidationError as error:
-        rows = error.errors(include_url=False, include_context=False, include_input=False)
-        wrong = {row["loc"][0] for row in rows}
-    fatal: list[str] = []
-    partial: list[str] = []
-    for name, field in model.model_fields.items():
-        if name in values and name not in wrong:
-            continue
-        clause = ""
-        if name in broken:
-            clause = "differs from its checksum" if name in raw else "is missing"
-        elif name in values:
-            clause = f"is not {field.description}{_shown(values.pop(name))}"
-        elif field.is_required():
-            clause = "is missing"
-        if clause:
-            (fatal if field.is_required() else partial).append(f'its attribute "{name}" {clause}')
-        if field.get_default() is not None and not field.is_required():
-            values[name] = field.get_default()
-    return values, fatal, partial
+        row = error.errors(include_url=False, include_context=False, include_input=False)[0]
+        name = str(row["loc"][0])
+        words = "is missing"
+        if name in values:
+            words = f"is not {model.model_fields[name].description}{_shown(values[name])}"
+        raise Damage(f'its attribute "{name}" {words}') from error
 
 
 def _decoded(text: Any) -> Any:
@@ -138,52 +131,38 @@ def _shown(value: Any) -> str:
     return "" if value is None else f" ({words[:40]}{'...' if len(words) > 40 else ''})"
 
 
-def table_values(
-    file: h5py.File, path: str, declared: Table, sizes: dict[str, int]
-) -> tuple[np.ndarray | None, str]:
-    """The values of a table and an empty text, or None and its fault.
+def table_values(file: h5py.File, path: str, declared: Table, sizes: dict[str, int]) -> np.ndarray:
+    """The values of a table as it is ``declared``; `Damage` if it is another one.
 
-    Parameters
-    ----------
-    file : h5py.File
-        Open result file.
-    path : str
-        Path of the table in the file.
-    declared : Table
-        Declaration of the table.
-    sizes : dict
-        Sizes of dimensions by name; those of the table are added.
+    ``sizes`` are those of dimensions that earlier tables have, to which its own are added.
     """
     try:
         values = np.asarray(file[path][()])
-    except (*HDF5_ERRORS, MemoryError):
-        return None, f"{path} is missing or cannot be read"
-    fault = values_fault(values, declared, sizes)
-    return (None, f"{path} {fault}") if fault else (values, "")
+    except (*HDF5_ERRORS, MemoryError) as error:
+        raise Damage(f"{path} is missing or cannot be read") from error
+    check_values(path, values, declared, sizes)
+    return values
 
 
-def values_fault(values: np.ndarray, declared: Table, sizes: dict[str, int]) -> str:
-    """The fault of the ``values`` of a table that the layout ``declared``, empty if they are valid.
-
-    ``sizes`` are those of dimensions that earlier tables have, to which these are added.
-    """
+def check_values(path: str, values: np.ndarray, declared: Table, sizes: dict[str, int]) -> None:
+    """Raise `Damage` unless ``values`` are those of a table as ``table_values`` says."""
     if values.dtype.kind not in ("iu" if declared.whole else "fiu"):
-        return f"holds {values.dtype} where numbers belong"
+        raise Damage(f"{path} holds {values.dtype} where numbers belong")
     if values.ndim != len(declared.dimensions):
-        return f"has {values.ndim} dimensions in place of {len(declared.dimensions)}"
+        raise Damage(f"{path} has {values.ndim} dimensions in place of {len(declared.dimensions)}")
     for name, size in zip(declared.dimensions, values.shape, strict=True):
         wanted = SIZES.get(name) or sizes.setdefault(name, size)
         if size != wanted:
-            return f"has {size} entries in place of {wanted}"
+            raise Damage(f"{path} has {size} entries in place of {wanted}")
     with np.errstate(invalid="ignore"):
         valid = (values >= declared.low) & (values <= declared.high)
         valid |= declared.may_be_nan & np.isnan(values)
     if not valid.all():
         found, unit = values[~valid].flat[0], "" if declared.unit == "-" else f" {declared.unit}"
-        return f"holds {found:g} in place of {declared.low:g} to {declared.high:g}{unit}"
+        bounds = f"{declared.low:g} to {declared.high:g}{unit}"
+        raise Damage(f"{path} holds {found:g} in place of {bounds}")
     if declared.ascending and (values.size < 2 or not (np.diff(values) > 0).all()):
-        return "does not ascend"
-    return ""
+        raise Damage(f"{path} does not ascend")
 
 
 def listed(faults: Collection[str]) -> str:
@@ -197,22 +176,19 @@ class Records(NamedTuple):
 
     Attributes
     ----------
-    rows : of the steps, the energies and the line's channels
-    damaged : path of a damaged table -> its rows before the damage; later ones read as NaN
+    rows : of the steps, the energies and the line's channels, before the first damage in a table
+        of these
     faults : the faults, as clauses
     last : time of the last valid step [s], NaN without one
     """
 
     rows: list[int]
-    damaged: dict[str, int]
     faults: list[str]
     last: float
 
 
-def table_faults(
-    file: h5py.File, record: LineRecord, sizes: dict[str, int], most: int
-) -> dict[str, str]:
-    """Faults of growing tables by path: missing, of the wrong type or of the wrong width.
+def check_tables(file: h5py.File, record: LineRecord, sizes: dict[str, int], most: int) -> None:
+    """Raise `Damage` if a growing table is missing, of the wrong type or of the wrong width.
 
     Parameters
     ----------
@@ -225,36 +201,33 @@ def table_faults(
     most : int
         Number of rows that the run plans.
     """
-    faults: dict[str, str] = {}
     steps, energies, line = growing_tables(record)
     for tables in (steps, energies if is_there(file, "energy") else {}, line):
         for path, channel in tables.items():
             if tables is line or path == "time" or channel.essential or is_there(file, path):
-                fault = _shape_fault(file, path, channel, sizes, most)
-                faults |= {path: fault} if fault else {}
-    return faults
+                _check_shape(file, path, channel, sizes, most)
 
 
-def _shape_fault(
+def _check_shape(
     file: h5py.File, path: str, channel: Channel, sizes: dict[str, int], most: int
-) -> str:
+) -> None:
     try:
         table = file[path]
         shape, kind = table.shape, table.dtype.kind
-    except HDF5_ERRORS:
-        return "is missing or cannot be read"
+    except HDF5_ERRORS as error:
+        raise Damage(f"{path} is missing or cannot be read") from error
     if kind != "f":
-        return "does not hold numbers"
+        raise Damage(f"{path} does not hold numbers")
     if len(shape) != (1 if channel.per == RUN else 2):
-        return f"has {len(shape)} dimensions"
+        raise Damage(f"{path} has {len(shape)} dimensions")
     if shape[0] > most:
-        return f"has {shape[0]} rows, of {most} that the run plans"
-    if channel.per == RUN:
-        return ""
-    # Without a list of the columns that are recorded all of them are.
-    all_of = sizes.get(ALL_COLUMNS.get(channel.per, ""), shape[1])
-    wanted = sizes.setdefault(COLUMNS[channel.per], all_of)
-    return "" if shape[1] == wanted else f"has {shape[1]} columns in place of {wanted}"
+        raise Damage(f"{path} has {shape[0]} rows, of {most} that the run plans")
+    if channel.per != RUN:
+        # Without a list of the columns that are recorded all of them are.
+        all_of = sizes.get(ALL_COLUMNS.get(channel.per, ""), shape[1])
+        wanted = sizes.setdefault(COLUMNS[channel.per], all_of)
+        if shape[1] != wanted:
+            raise Damage(f"{path} has {shape[1]} columns in place of {wanted}")
 
 
 def scan(
@@ -262,83 +235,65 @@ def scan(
     about: dict[str, Any],
     record: LineRecord,
     dt: float,
-    faults: dict[str, str],
     complete: tuple[list[int], str] | None = None,
 ) -> Records:
-    """Read all records once, by blocks, and find the valid ones.
+    """Read all records once, by blocks, up to the first that is damaged in a table of its kind.
 
     Parameters
     ----------
     file : h5py.File
-        Open result file.
+        Open result file, whose tables are checked.
     about : dict
         Valid root attributes.
     record : LineRecord
         Which of the line's channels are recorded.
     dt : float
         Time between two records [s].
-    faults : dict
-        Faults from ``table_faults``.
     complete : tuple, optional
         Counts that ``committed_rows`` found earlier, None to find them now.
     """
     n_complete, fault = committed_rows(file) if complete is None else complete
-    clauses = [f"{path} {clause}" for path, clause in faults.items()] + ([fault] if fault else [])
-    damaged = dict.fromkeys(faults, 0)
-    rows = [0, 0, 0]
+    clauses = [fault] if fault else []
+    rows = []
     for number, tables in enumerate(growing_tables(record)):
-        usable = {p: c for p, c in tables.items() if p not in faults and is_there(file, p)}
-        # All of the energies are used, or none.
-        if CLOCKS[number] not in usable or (number == 1 and faults.keys() & tables.keys()):
-            continue
-        lengths = {path: file[path].shape[0] for path in usable}
-        short = min(lengths, key=lambda path: lengths[path])
-        n = min(n_complete[number], lengths[short])
-        if n < n_complete[number]:
-            clauses.append(f"{short} ends after {n} of {n_complete[number]} records")
-        parted = {}
+        usable = {p: c for p, c in tables.items() if is_there(file, p)}
+        n = n_complete[number] if usable else 0
         for path, channel in usable.items():
+            if file[path].shape[0] < n:
+                clauses.append(f"{path} ends after {file[path].shape[0]} of {n} records")
+                n = file[path].shape[0]
             may_be_nan = channel.may_be_nan or (number == 2 and record.window is not None)
             valid = valid_rows(file[path], n, largest(channel.unit), may_be_nan)
             if path == CLOCKS[number]:
                 valid = min(valid, _in_order(file[path], valid, dt if number == 0 else None))
-            if valid < n and (channel.essential or path == CLOCKS[number]):
+            if valid < n:
                 clauses.append(f"{path} is damaged from record {valid} on")
                 n = valid
-            elif valid < n:
-                parted[path] = valid
-        parted = {path: valid for path, valid in parted.items() if valid < n}
-        words = "{} is damaged from record {} on, and left out from there"
-        clauses += [words.format(path, valid) for path, valid in parted.items()]
-        damaged |= parted
-        rows[number] = n
+        rows.append(n)
     clauses += _missing_end(about, rows[0])
     last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")
-    return Records(rows, damaged, clauses, last)
+    return Records(rows, clauses, last)
 
 
 def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) -> int:
     """Number of the first ``n_rows`` rows of a table before one that cannot be read, or holds
     infinity, more than ``most``, or NaN unless it ``may_be_nan``."""
     n_columns = int(np.prod(table.shape[1:]))
-    chunk, start = table.chunks[0] if table.chunks else 1, 0
-    try:
-        for part in row_blocks(n_rows, min(n_columns, COLUMNS_AT_ONCE), chunk):
-            start = part.start
-            bad = _invalid(table, part, n_columns, most, may_be_nan)
-            if bad.any():
-                return start + int(bad.argmax())
-        return n_rows
-    except HDF5_ERRORS:
-        pass  # somewhere in this block
-    for first in range(start, n_rows, chunk):
-        part = slice(first, min(first + chunk, n_rows))
+    chunk = table.chunks[0] if table.chunks else 1
+    parts = list(row_blocks(n_rows, min(n_columns, COLUMNS_AT_ONCE), chunk))
+    while parts:
+        part = parts.pop(0)
         try:
             bad = _invalid(table, part, n_columns, most, may_be_nan)
         except HDF5_ERRORS:
-            return first
+            if part.stop - part.start <= chunk:
+                return part.start
+            # Somewhere in this block, which is read again chunk by chunk.
+            begins = range(part.start, part.stop, chunk)
+            parts[:0] = [slice(first, min(first + chunk, part.stop)) for first in begins]
+            continue
         if bad.any():
-            return first + int(bad.argmax())
+            return part.start + int(bad.argmax())
     return n_rows
 
 

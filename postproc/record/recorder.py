@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.postproc.channels.header import Header, LineRecord
 from catenary.postproc.files.committed_rows import ForceFilter
 from catenary.postproc.files.disk import Elsewhere, NoRoom, broken_write
+from catenary.postproc.files.header import Header, LineRecord
 from catenary.postproc.files.result_file import LineRows, ResultFile
 from catenary.postproc.files.run_schema import DONE, INTERRUPTED
 from catenary.postproc.record.file_observer import ColumnGather, FileObserver

@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.postproc.channels.header import in_sentence, places_on_train
 from catenary.postproc.evaluate.wording import capital
+from catenary.postproc.files.header import in_sentence, places_on_train
 from catenary.solver.model.beam import MOST_ROTATION
 from catenary.solver.model.loads import MemoryLoad
 from catenary.solver.statics.line_at_rest import LineAtRest

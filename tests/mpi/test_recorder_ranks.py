@@ -18,12 +18,12 @@ import pytest
 from mpi4py import MPI
 
 from catenary import RunBroken
-from catenary.postproc.channels.header import Header, LineRecord
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
+from catenary.postproc.files.header import Header, LineRecord
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
-from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.postproc.record.snapshots.contents import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.solver.time_loop.views.channels import TrainLayout
 from catenary.solver.time_loop.views.observers import NodeMotion, Stage, StepView

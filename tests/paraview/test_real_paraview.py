@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 from program import catenary
 
-from catenary.postproc.paraview.open_in_paraview import SCREEN_OF_ITS_OWN
+from catenary.postproc.film.open_in_paraview import SCREEN_OF_ITS_OWN
 from catenary.postproc.read.results import Results
 
 TOOLS = ("pvpython", "xvfb-run")

@@ -23,12 +23,11 @@ from catenary.cases.studies.waves.seen import WavesSeen, WireMotion, course_of, 
 from catenary.cases.studies.waves.study import Watch, excitation_of, study_waves, without_train
 from catenary.postproc.evaluate.statistics import evaluate
 from catenary.postproc.files.run_schema import RunAttributes
-from catenary.postproc.film import animate
+from catenary.postproc.film import animate, open_in_paraview
 from catenary.postproc.film.drawing import RingingChart
 from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import FilmOptions
 from catenary.postproc.film.scenery import Scenery
-from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.pictures import line_pictures
 from catenary.postproc.report.report import write_report
@@ -100,7 +99,7 @@ def test_nothing_continues_a_blow_as_a_run_of_its_train(struck: tuple[Path, Wave
 def test_paraview_shows_a_blow_without_a_train(struck: tuple[Path, WavesSeen]) -> None:
     script, *files = open_in_paraview.write_script(struck[0], None)
     names = {path.name for path in files}
-    assert names == {"pantographs.xdmf", "forces.xdmf", "track.xdmf"}
+    assert names == {"line.xdmf", "pantographs.xdmf", "forces.xdmf", "track.xdmf"}
     assert '"train": ""' in script.read_text()
 
 

@@ -17,7 +17,7 @@ from catenary.cases.run.needs import Kept, needs_before_meshing, needs_with_mesh
 from catenary.cases.run.runner import run_case
 from catenary.cases.scene.checks.mesh_size import estimate_memory
 from catenary.cases.terminal import console
-from catenary.postproc.channels.header import GZIP
+from catenary.postproc.files.header import GZIP
 from catenary.postproc.read.results import Results
 
 # 0.45 s on a line of 22 spans.

@@ -31,7 +31,7 @@ from catenary.meshgen.line import DropperKind, Droppers, Line
 from catenary.meshgen.mesh import CONTACT_WIRE, DROPPERS, MESSENGER_WIRE, LineMesh, elements_of
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.header import line_datasets
+from catenary.postproc.files.header import line_datasets
 from catenary.postproc.record.snapshots.contents import RecordedLine, blocks_of
 from catenary.solver.model.beam import uniform_load
 from catenary.solver.model.rest_shape import Equilibrium

@@ -77,7 +77,7 @@ def data() -> list[Path]:
         "cases/studies/reference/*.toml",
         "cases/studies/reference/data/*",
         "postproc/report/templates/*",
-        "postproc/paraview/*.template",
+        "postproc/film/*.template",
         "postproc/standards/books/*.toml",
         "solver/kernels/simulation/catenary.h",
     )

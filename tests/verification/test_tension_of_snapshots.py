@@ -13,17 +13,20 @@ from small_lines import mesh_of, problem_of
 from catenary.meshgen.line import Curve
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.postproc.record.snapshots.contents import ALONG as U
+from catenary.postproc.record.snapshots.contents import (
+    ALONG as U,
+)
 from catenary.postproc.record.snapshots.contents import (
     ASIDE,
     KINDS,
     SLOPE,
     TURN,
     UP,
+    FieldRecord,
     RecordedLine,
     blocks_of,
+    layout_of,
 )
-from catenary.postproc.record.snapshots.field_layout import FieldRecord, layout_of
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.solver.effects.all_effects import with_defects
 from catenary.solver.model.axial_motion import strain_rows, unknowns_along

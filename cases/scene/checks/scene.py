@@ -30,7 +30,7 @@ from catenary.cases.scene.scene import Scene, end_of, strips_ahead
 from catenary.meshgen.slowest_wave import bends, slowest_wave
 from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.meshgen.topologies.line_data import LineData
-from catenary.postproc.channels.header import in_sentence, places_on_train
+from catenary.postproc.files.header import in_sentence, places_on_train
 from catenary.postproc.record.snapshots.contents import OTHER_PARTS
 from catenary.postproc.standards.rule_books import (
     DEFAULT,

@@ -19,9 +19,9 @@ from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Paramet
 from catenary.cases.terminal.runs_bar import RunsBar
 from catenary.cases.terminal.terminal_text import elasticity_text
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.header import places_on_train
 from catenary.postproc.evaluate import filters, statistics
 from catenary.postproc.evaluate.statistics import ForceDerivatives, covers
+from catenary.postproc.files.header import places_on_train
 from catenary.postproc.report.study_table import Column, StudyTable
 from catenary.solver.model.model import same_matrices
 from catenary.solver.statics.line_at_rest import LineAtRest

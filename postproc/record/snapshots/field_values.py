@@ -16,8 +16,8 @@ from catenary.postproc.record.snapshots.contents import (
     Block,
     FieldKind,
     RecordedLine,
+    Slots,
 )
-from catenary.postproc.record.snapshots.field_layout import Slots
 from catenary.solver.kernels import native
 from catenary.solver.model.axial_motion import rows_in_curve, slope_rows
 

@@ -13,8 +13,12 @@ import numpy as np
 from catenary.base.errors import RunBroken
 from catenary.postproc.files.disk import broken_write
 from catenary.postproc.record.file_observer import ColumnGather, FileObserver
-from catenary.postproc.record.snapshots.contents import Block, RecordedLine, blocks_of
-from catenary.postproc.record.snapshots.field_layout import FieldRecord
+from catenary.postproc.record.snapshots.contents import (
+    Block,
+    FieldRecord,
+    RecordedLine,
+    blocks_of,
+)
 from catenary.postproc.record.snapshots.field_values import FieldValues, Gathered
 from catenary.postproc.record.snapshots.fields_file import FieldsFile
 from catenary.solver.time_loop.views.observers import Stage, StepView

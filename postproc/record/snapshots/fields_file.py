@@ -1,14 +1,10 @@
 """The files of snapshots: HDF5 for the numbers, XDMF for their meaning.
 
 All tables have their full length from the first step on and their places never change: a killed
-run cannot spoil them. XDMF's readers take the numbers from these places; hyperslabs of a table
-lose their arrays silently in the Xdmf3 reader.
+run cannot spoil them.
 
-The XDMF text is well-formed after each snapshot. It names all snapshots that are planned from the
-start on, block by block. Those that are not there yet stand in a section of plain text (CDATA),
-which readers pass over. Its begin moves over each snapshot that appears: two writes of a few bytes
-a block, whatever the length of the text. Between the two the mark of the later place is plain text
-itself, so that a kill leaves a text that can be read.
+Its XDMF text names the snapshots that are there when the file is closed; ``catenary paraview``
+writes one of its own, of a run that goes on or was killed as well.
 """
 
 from __future__ import annotations
@@ -16,9 +12,7 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
-import math
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +23,8 @@ from h5py import h5d, h5p, h5s, h5t
 from catenary.base.files import new_part
 from catenary.postproc.files.disk import (
     MARGIN,
+    Cut,
+    Elsewhere,
     check_in_place,
     check_uncut,
     opened,
@@ -36,13 +32,14 @@ from catenary.postproc.files.disk import (
     write_at,
     write_whole,
 )
-from catenary.postproc.files.hdf5 import put_array, set_attribute
-from catenary.postproc.record.snapshots.contents import Block
-from catenary.postproc.record.snapshots.field_layout import (
+from catenary.postproc.files.disk_errors import reason
+from catenary.postproc.files.hdf5 import Damage, open_own, put_array, set_attribute
+from catenary.postproc.record.snapshots.contents import (
     FORMAT,
     PLACES,
     RESTS_BEYOND,
     SIZES,
+    Block,
     FieldRecord,
     Slots,
     layout_of,
@@ -56,20 +53,6 @@ logger = logging.getLogger("catenary.fields")
 
 # Rows of a table that are copied at once.
 _ROWS_OF_COPY = 1 << 16
-_HIDE, _END = b"<![CDATA[", b"]]>"
-_SHOW = b" " * len(_HIDE)
-_BEGIN = b"""\
-<?xml version="1.0" encoding="UTF-8"?>
-<Xdmf Version="3.0">
-  <Domain>
-    <Grid Name="line" GridType="Collection" CollectionType="Spatial">
-"""
-_CLOSE = b"    </Grid>\n  </Domain>\n</Xdmf>\n"
-_BLOCK_CLOSE = b"      </Grid>\n"
-# Readers take the numbers from their places in the file, as they stand there.
-_KINDS = {
-    "<f4": ("Float", 4), "<f8": ("Float", 8), "<i4": ("Int", 4), "|i1": ("Char", 1),
-}  # fmt: skip
 
 
 class FieldsFile:
@@ -104,7 +87,6 @@ class FieldsFile:
         self._written: list[float] = []
         self._planned: list[float] = []
         self._layout: list[Slots] = []
-        self._text: GrowingXdmf | None = None
         self._handle, self._size = -1, 0
         self.is_published = False
 
@@ -152,7 +134,7 @@ class FieldsFile:
             return False
         # Of all that reads files this alone is for runs that continue one.
         from catenary.postproc.read.guard import survives
-        from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
+        from catenary.postproc.record.snapshots.fields_schema import read_fields
 
         try:
             if not survives(self.path):
@@ -171,7 +153,7 @@ class FieldsFile:
             if planned.size > len(self._planned):
                 self._lengthen(planned)
                 return True
-        except (OSError, KeyError, RuntimeError, TypeError, ValueError, FieldsFault):
+        except (OSError, KeyError, RuntimeError, TypeError, ValueError, Damage):
             logger.warning(
                 "%s cannot be continued, it is damaged or of another version: its snapshots now "
                 "begin at t = %.3f s",
@@ -182,7 +164,6 @@ class FieldsFile:
             return False
         self._open(self.path)
         self.is_published = True
-        self._describe()
         return True
 
     def _lengthen(self, numbers: np.ndarray) -> None:
@@ -201,12 +182,13 @@ class FieldsFile:
         self.publish()
 
     def publish(self) -> None:
-        """Give a new file its name, in place of an earlier one; OSError if that fails."""
+        """Give a new file its name, in place of an earlier one, whose text goes; OSError if that
+        fails."""
         if self._handle < 0 or self.is_published:
             return
         os.replace(self._made_as, self.path)
         self.is_published = True
-        self._describe()
+        self._xdmf.unlink(missing_ok=True)
 
     def append(self, times: list[float], known: Gathered) -> None:
         """Write snapshots at ``times`` [s]; OSError if that fails."""
@@ -223,19 +205,31 @@ class FieldsFile:
         self._written += times
         if self.is_published:
             check_in_place(self.path, self._handle)
-            self._describe()
 
     def close(self) -> None:
-        """Close the files, and remove files that were never published."""
+        """Close the file and write its text, or remove a file that was never published."""
         if self._handle < 0:
             return
+        if self.is_published:
+            self._describe()
+        else:
+            self._made_as.unlink(missing_ok=True)
         os.close(self._handle)
         self._handle = -1
-        if self._text is not None:
-            self._text.close()
-        if not self.is_published:
-            with contextlib.suppress(OSError):
-                self._made_as.unlink(missing_ok=True)
+
+    def _describe(self) -> None:
+        """Write the XDMF file of the snapshots that are there, if it can be written."""
+        from catenary.postproc.record.snapshots.fields_schema import read_fields, xdmf_of
+
+        with contextlib.suppress(Elsewhere, Cut):  # by which the run was ended
+            check_in_place(self.path, self._handle)
+            check_uncut(self.path, self._handle, self._size)
+            try:
+                with open_own(self.path, locking=False) as file:
+                    write_whole(self._xdmf, xdmf_of(file, read_fields(file), self.path.name))
+            except OSError as error:
+                sentence = "writing %s failed (%s); `catenary paraview` does without it"
+                logger.warning(sentence, self._xdmf, reason(error))
 
     def _open(self, path: Path) -> None:
         self._handle = os.open(path, os.O_RDWR)
@@ -280,9 +274,8 @@ class FieldsFile:
         self._places_at = _place_of(file, PLACES)
         self._places: list[dict[str, int]] = []
         for slots in self._layout:
-            names = "points", "cells", *(kind.name for kind in slots.kinds)
             group = file[slots.name]
-            self._places.append({name: _place_of(group, name) for name in names})
+            self._places.append({kind.name: _place_of(group, kind.name) for kind in slots.kinds})
 
     def _refuse_other(self, known: FieldTables, times: np.ndarray) -> None:
         """Raise ValueError if a file that is to be continued is not of this run and these places.
@@ -311,16 +304,6 @@ class FieldsFile:
         if (ends[:-1] > starts[1:]).any() or ends.max() > self.path.stat().st_size:
             raise ValueError("places")
 
-    def _describe(self) -> None:
-        """List in the XDMF file the snapshots that are there."""
-        if self._text is None:
-            blocks = {
-                slots.name: _grids_of(slots, self._planned, self.path.name, places)
-                for slots, places in zip(self._layout, self._places, strict=True)
-            }
-            self._text = GrowingXdmf(self._xdmf, blocks, len(self._written))
-        self._text.show(len(self._written))
-
 
 def _create(
     group: h5py.Group, name: str, shape: tuple[int, ...], number: str, how: h5p.PropDCID
@@ -333,110 +316,3 @@ def _create(
 def _place_of(group: h5py.Group, name: str) -> int:
     """Offset of a table in the file [B], 0 if it has no numbers; KeyError without one."""
     return h5d.open(group.id, name.encode()).get_offset() or 0
-
-
-class GrowingXdmf:
-    """An XDMF 3 file with a series of grids for each block. Not collective.
-
-    Parameters
-    ----------
-    path : the file, which is written at once and takes the place of another
-    blocks : name of each block -> the text of its grids, one for each planned snapshot
-    n_shown : how many snapshots are there
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
-
-    def __init__(self, path: Path, blocks: Mapping[str, list[str]], n_shown: int) -> None:
-        self._path, self._n_shown = path, n_shown
-        self._blocks = {name: [grid.encode() for grid in grids] for name, grids in blocks.items()}
-        pieces, at = [_BEGIN], len(_BEGIN)
-        self._marks: list[list[int]] = []
-        for name, grids in self._blocks.items():
-            marks = []
-            pieces.append(_block_begin(name))
-            at += len(pieces[-1])
-            for number in range(len(grids) + 1):
-                marks.append(at)
-                grid = grids[number] if number < len(grids) else b""
-                pieces += [_HIDE if number == n_shown else _SHOW, b"\n", grid]
-                at += len(_HIDE) + 1 + len(grid)
-            pieces += [_END, _BLOCK_CLOSE]
-            at += len(_END) + len(_BLOCK_CLOSE)
-            self._marks.append(marks)
-        write_whole(path, b"".join([*pieces, _CLOSE]))
-        self._handle = os.open(path, os.O_WRONLY)
-
-    def show(self, n_shown: int) -> None:
-        """Show the first ``n_shown`` snapshots, not fewer than before; OSError if not."""
-        if n_shown == self._n_shown:
-            return
-        for marks in self._marks:
-            for number, mark in ((n_shown, _HIDE), (self._n_shown, _SHOW)):
-                write_at(self._handle, marks[number], np.frombuffer(mark, dtype=np.uint8))
-        self._n_shown = n_shown
-
-    def close(self) -> None:
-        """Close the file, written anew without what never appeared if there is room for it."""
-        os.close(self._handle)
-        pieces = [_BEGIN]
-        for name, grids in self._blocks.items():
-            pieces += [_block_begin(name), *grids[: self._n_shown], _BLOCK_CLOSE]
-        with contextlib.suppress(OSError):
-            write_whole(self._path, b"".join([*pieces, _CLOSE]))
-
-
-def _block_begin(name: str) -> bytes:
-    return f'      <Grid Name="{name}" GridType="Collection" CollectionType="Temporal">\n'.encode()
-
-
-def _grids_of(
-    slots: Slots, times: list[float], h5_name: str, offsets: Mapping[str, int]
-) -> list[str]:
-    """The grids of a block at ``times`` [s]. ``h5_name`` is the file of the numbers, relative to
-    that of the text, ``offsets`` the place in it at which each table of the block begins [B]."""
-    # Grids differ in numbers only: one text for all, into which these are put.
-    moves = bool(np.ptp(slots.first) or np.ptp(slots.count))
-    file, block = h5_name.replace("%", "%%"), slots.name.replace("%", "%%")
-    # The XDMF reader takes a mesh for the one before if its items begin alike.
-    name, numbers = (f"<!-- %d -->{file}", (np.arange(len(times)),)) if moves else (file, ())
-    cells, of_cells = _items((2,), "<i4", offsets["cells"], slots.cell_count, slots.cell_first)
-    places, of_places = _items((3,), "<f8", offsets["points"], slots.count, slots.first)
-    text = (
-        f'<Grid Name="{block}" GridType="Uniform"><Time Value="%r"/>\n'
-        '<Topology TopologyType="Polyline" NodesPerElement="2" NumberOfElements="%d">'
-        f"{cells}{name}</DataItem></Topology>\n"
-        f'<Geometry GeometryType="XYZ">{places}{name}</DataItem></Geometry>\n'
-    )
-    columns = [slots.cell_count, *of_cells, *numbers, *of_places, *numbers]
-    for kind in slots.kinds:
-        width = () if kind.components == 1 else (kind.components,)
-        n_values = kind.values_of(slots.count)
-        start = kind.values_of(slots.start[:-1])
-        values, of_values = _items(width, kind.number, offsets[kind.name], n_values, start)
-        text += (
-            f'<Attribute Name="{kind.name}" '
-            f'AttributeType="{"Scalar" if kind.components == 1 else "Vector"}" '
-            f'Center="{"Cell" if kind.of_droppers else "Node"}">'
-            f"{values}{file}</DataItem></Attribute>\n"
-        )
-        columns += of_values
-    text += "</Grid>\n"
-    rows = zip(times, *(column[: len(times)].tolist() for column in columns), strict=True)
-    return [text % row for row in rows]
-
-
-def _items(
-    width: tuple[int, ...], number: str, offset: int, count: np.ndarray, row: np.ndarray
-) -> tuple[str, list[np.ndarray]]:
-    """Text up to the file's name of items with ``count`` rows each, from number ``row`` on, of a
-    table that begins at ``offset`` in the file; and the numbers that go into it, item by item."""
-    name, size = _KINDS[number]
-    text = (
-        f'<DataItem Dimensions="{" ".join(["%d", *map(str, width)])}" NumberType="{name}" '
-        f'Precision="{size}" Format="Binary" Endian="Little" Seek="%d">'
-    )
-    return text, [count, offset + row * (math.prod(width) * size)]

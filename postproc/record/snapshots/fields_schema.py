@@ -1,4 +1,5 @@
-"""The attributes and tables of ``fields.h5``, declared once, and read against the declaration.
+"""The attributes and tables of ``fields.h5``, declared once, read against the declaration, and told
+to ParaView as XDMF.
 
 As ``run_schema`` and ``result_tables`` do for ``run.h5``. Fields themselves are checked for kind
 and length here, and for their values snapshot by snapshot. Not collective.
@@ -6,6 +7,7 @@ and length here, and for their values snapshot by snapshot. Not collective.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, NamedTuple
 
 import h5py
@@ -13,11 +15,20 @@ import numpy as np
 from h5py import h5d
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from catenary.postproc.files.hdf5 import HDF5_ERRORS
+from catenary.postproc.files import xdmf
+from catenary.postproc.files.hdf5 import HDF5_ERRORS, Damage
 from catenary.postproc.files.run_schema import JSON, Positive, Table, Text, count_table, largest
 from catenary.postproc.read.validation import read_attributes, table_values
-from catenary.postproc.record.snapshots.contents import FIXED, KINDS, OTHER_PARTS, FieldKind
-from catenary.postproc.record.snapshots.field_layout import FORMAT, PLACES, SIZES, BlockTables
+from catenary.postproc.record.snapshots.contents import (
+    FIXED,
+    FORMAT,
+    KINDS,
+    OTHER_PARTS,
+    PLACES,
+    SIZES,
+    BlockTables,
+    FieldKind,
+)
 
 # More snapshots or pantographs' numbers than any run has; nothing larger is read.
 _MOST_SNAPSHOTS, _MOST_PARTS, _MOST_PLACES = 10**7, 10**4, 10**6
@@ -74,25 +85,19 @@ class FieldTables(NamedTuple):
     blocks: dict[str, BlockTables]
 
 
-class FieldsFault(Exception):
-    """A file of snapshots is invalid; the message is a clause."""
-
-
 def read_fields(file: h5py.File) -> FieldTables:
     """All of a file of snapshots but the fields and the places of pantographs.
 
     Raises
     ------
-    FieldsFault
+    Damage
         If anything is missing, of another kind, or does not fit the rest.
     """
-    about, *faults = read_attributes(file, FieldsAttributes)
-    for fault in sum(faults, []):
-        raise FieldsFault(fault)
+    about = read_attributes(file, FieldsAttributes)
     clock = _table(file, "times", np.dtype("<f8"), (None,))
     n_planned = clock.shape[0]
     if n_planned > _MOST_SNAPSHOTS:
-        raise FieldsFault(f"times has {n_planned} rows, and no run has so many snapshots")
+        raise Damage(f"times has {n_planned} rows, and no run has so many snapshots")
     sizes = _read(file, SIZES, count_table(("pantograph",), most=_MOST_PLACES), {})
     _table(file, PLACES, np.dtype("<f8"), (n_planned, sizes.size + int(sizes.sum())))
     n_nodes = int(about["n_nodes"])
@@ -112,27 +117,24 @@ def _table(
         there, own = table.shape, table.dtype
         layout = table.id.get_create_plist().get_layout()
     except HDF5_ERRORS as error:
-        raise FieldsFault(f"{path} is missing or cannot be read") from error
+        raise Damage(f"{path} is missing or cannot be read") from error
     if kind is not None and own != kind:
-        raise FieldsFault(f"{path} holds {own} in place of {kind}")
+        raise Damage(f"{path} holds {own} in place of {kind}")
     wanted = (
         tuple(size if one is None else one for one, size in zip(shape, there, strict=False))
         + shape[len(there) :]
     )
     if there != wanted:
-        raise FieldsFault(f"{path} has the shape {there} in place of {wanted}")
+        raise Damage(f"{path} has the shape {there} in place of {wanted}")
     if layout != h5d.CONTIGUOUS or (table.size and table.id.get_offset() is None):
-        raise FieldsFault(f"{path} does not stand in one piece in the file")
+        raise Damage(f"{path} does not stand in one piece in the file")
     return table
 
 
 def _read(file: h5py.File, path: str, declared: Table, sizes: dict[str, int]) -> np.ndarray:
     """The values of a table as it is declared; ``sizes`` of dimensions are added."""
     _table(file, path, None, (None,) * len(declared.dimensions))
-    values, fault = table_values(file, path, declared, sizes)
-    if values is None:
-        raise FieldsFault(fault)
-    return values
+    return table_values(file, path, declared, sizes)
 
 
 def _times(clock: h5py.Dataset) -> np.ndarray:
@@ -146,9 +148,9 @@ def _times(clock: h5py.Dataset) -> np.ndarray:
             break
     times = np.concatenate(parts)
     if not (np.diff(times) > 0.0).all():
-        raise FieldsFault("times does not ascend")
+        raise Damage("times does not ascend")
     if times.size and not 0.0 <= times[0] <= times[-1] <= largest("s"):
-        raise FieldsFault(f"times reaches from {times[0]:g} to {times[-1]:g} s, which cannot be")
+        raise Damage(f"times reaches from {times[0]:g} to {times[-1]:g} s, which cannot be")
     return times
 
 
@@ -166,10 +168,10 @@ def _block(file: h5py.File, name: str, n_planned: int, n_nodes: int) -> BlockTab
     wrong = (found.count < least) | (found.first + found.count > most)
     wrong |= (found.first % step != 0) | (found.count % step != 0)
     if wrong.any() or most % step:
-        raise FieldsFault(f"{name}/first and {name}/count do not show points out of its {most}")
+        raise Damage(f"{name}/first and {name}/count do not show points out of its {most}")
     fault = _cells_fault(found)
     if fault:
-        raise FieldsFault(f"{name}/{fault}")
+        raise Damage(f"{name}/{fault}")
     for kind in KINDS.values():
         if kind.name in file[name]:
             _field(file, name, kind, int(found.count.sum()))
@@ -194,7 +196,49 @@ def _cells_fault(block: BlockTables) -> str:
 
 
 def _field(file: h5py.File, name: str, kind: FieldKind, n_points: int) -> None:
-    """Raise FieldsFault unless a field has its numbers for all points of all snapshots."""
+    """Raise Damage unless a field has its numbers for all points of all snapshots."""
     rows = kind.values_of(n_points)
     shape = (rows, kind.components)[: 1 + (kind.components > 1)]
     _table(file, f"{name}/{kind.name}", np.dtype(kind.number), shape)
+
+
+def xdmf_of(file: h5py.File, tables: FieldTables, path: str) -> str:
+    """XDMF of the snapshots of a file, which is at ``path`` beside the text."""
+    times = tables.times.tolist()
+    blocks = [
+        xdmf.collection(name, _grids(file[name], name, block, times, path))
+        for name, block in tables.blocks.items()
+    ]
+    return xdmf.document(xdmf.collection("line", blocks, "Spatial"))
+
+
+def _grids(
+    group: h5py.Group, name: str, block: BlockTables, times: list[float], path: str
+) -> Iterator[str]:
+    """The grids of a block at ``times`` [s]."""
+    kinds = [kind for kind in KINDS.values() if kind.name in group]
+    names = ("cells", "points", *(kind.name for kind in kinds))
+    cells, points, *fields = (
+        xdmf.Item(own.shape, own.dtype, path, own.id.get_offset() or 0)
+        for own in map(group.__getitem__, names)
+    )
+    counts = block.count.tolist()
+    starts = (np.cumsum(block.count) - block.count).tolist()
+    for k, time in enumerate(times):
+        first, n = int(block.first[k]), counts[k]
+        # The XDMF reader takes a mesh for the one before if its items begin alike.
+        mark = f"<!-- {first} {n} -->"
+        yield xdmf.grid(
+            name,
+            cells.rows(int(block.cell_first[k]), int(block.cell_count[k]), mark),
+            points.rows(first, n, mark),
+            [
+                xdmf.Values(
+                    kind.name,
+                    field.rows(kind.values_of(starts[k]), kind.values_of(n)),
+                    kind.of_droppers,
+                )
+                for kind, field in zip(kinds, fields, strict=True)
+            ],
+            time,
+        )

@@ -9,10 +9,10 @@ from shlex import quote
 
 import numpy as np
 
-from catenary.postproc.channels.header import record_words
 from catenary.postproc.evaluate.error_indicators import Indicators
 from catenary.postproc.evaluate.remarks import all_remarks
 from catenary.postproc.evaluate.wording import counted, of_digits
+from catenary.postproc.files.header import record_words
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.page import EvaluatedRun, Folded, Section, Text, has_train, number
 from catenary.postproc.report.study_table import StudyTable, texts_table

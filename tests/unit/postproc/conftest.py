@@ -18,8 +18,8 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line as make_line_of
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.meshgen.wires import Conductor
-from catenary.postproc.channels.facts import facts_of
-from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
+from catenary.postproc.files.facts import facts_of
+from catenary.postproc.files.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.contents import RecordedLine
 from catenary.solver.model.rest_shape import Equilibrium

@@ -14,11 +14,11 @@ from scipy import signal
 
 import catenary
 from catenary.cases.ambrosio2012 import passages
-from catenary.postproc.channels.header import LineRecord
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import slack_times
 from catenary.postproc.files import hdf5
 from catenary.postproc.files.committed_rows import store_extremes
+from catenary.postproc.files.header import LineRecord
 from catenary.postproc.files.run_schema import COMPLETE
 from catenary.postproc.read import validation
 from catenary.postproc.read.results import Results, in_stretch

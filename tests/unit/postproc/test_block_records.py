@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from catenary.postproc.channels.header import GZIP, LineRecord
+from catenary.postproc.files.header import GZIP, LineRecord
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.fields import FieldRecorder

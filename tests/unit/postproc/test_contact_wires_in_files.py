@@ -15,9 +15,9 @@ from small_lines import mesh_of
 
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
-from catenary.postproc.channels.facts import facts_of
-from catenary.postproc.channels.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.evaluate.error_indicators import indicate
+from catenary.postproc.files.facts import facts_of
+from catenary.postproc.files.header import Header, line_datasets, static_datasets, wire_roles
 from catenary.postproc.film.film_data import FilmData
 from catenary.postproc.read.results import ContactProfile, LineOfRun, Results
 from catenary.postproc.record.recorder import Recorder

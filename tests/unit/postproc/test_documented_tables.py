@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.postproc.channels.facts import FACTS
+from catenary.postproc.files.facts import FACTS
 from catenary.solver.time_loop.views.channels import CHANNELS, ENERGIES, RUN
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "architecture.md"

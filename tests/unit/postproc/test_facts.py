@@ -21,9 +21,9 @@ from catenary.cases.scene.keys.units import unit_of
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.lumped_data import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
-from catenary.postproc.channels.facts import FACTS, WIRE, facts_of
 from catenary.postproc.evaluate.error_indicators import as_table, indicate
 from catenary.postproc.evaluate.statistics import evaluate
+from catenary.postproc.files.facts import FACTS, WIRE, facts_of
 from catenary.postproc.files.hdf5 import seal_arrays
 from catenary.postproc.read.results import Results
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw

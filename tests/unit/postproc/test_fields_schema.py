@@ -14,10 +14,11 @@ import pytest
 from studies import few
 
 from catenary import InputError
+from catenary.postproc.files.hdf5 import Damage
 from catenary.postproc.film.film_data import Snapshots
-from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.postproc.record.snapshots.contents import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.postproc.record.snapshots.fields_schema import FieldsFault, read_fields
+from catenary.postproc.record.snapshots.fields_schema import read_fields
 
 pytestmark = pytest.mark.usefixtures("examined_here")
 WIRE = "contact_wire"
@@ -154,5 +155,5 @@ def test_cells_of_a_window_are_those_of_its_points(made: Path, tmp_path: Path) -
     path = Path(shutil.copy(made / "window.h5", tmp_path))
     with h5py.File(path, "r+") as file:
         file[f"{WIRE}/cell_count"][-1] += 1
-        with pytest.raises(FieldsFault, match="contact_wire/cell"):
+        with pytest.raises(Damage, match="contact_wire/cell"):
             read_fields(file)

@@ -34,7 +34,7 @@ from catenary.postproc.film.options import FilmOptions, View
 from catenary.postproc.film.scenery import FORCES, PANTOGRAPHS, TRAIN, Projection, Scenery
 from catenary.postproc.read.guard import survives
 from catenary.postproc.read.results import Results
-from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
+from catenary.postproc.record.snapshots.contents import Course, FieldRecord
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 from catenary.postproc.report.pictures.figures import stacked
 

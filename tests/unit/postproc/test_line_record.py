@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from studies import few
 
-from catenary.postproc.channels.header import GZIP, LineRecord, from_table, record_words
 from catenary.postproc.evaluate import statistics
+from catenary.postproc.files.header import GZIP, LineRecord, record_words
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.solver.time_loop.views.channels import TrainLayout, line_channels_of_all
@@ -144,7 +144,7 @@ def test_extremes_of_a_broken_run_are_those_of_its_rows(tmp_path: Path, make_mar
 
 def test_a_record_is_told_in_words_and_kept_in_the_file() -> None:
     both = LineRecord(every=5, window=(300.0, 200.0), compression=GZIP, by_size=True)
-    assert from_table(both.as_table()) == both
+    assert LineRecord.model_validate(both.model_dump(mode="json", by_alias=True)) == both
     assert record_words(both, 1e-3) == (
         "recorded every 5 ms within 300 m behind and 200 m ahead of the train; extremes are kept "
         "of every step; compressed (chosen by size)"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from catenary.postproc.channels.header import LineRecord
+from catenary.postproc.files.header import LineRecord
 from catenary.postproc.record.recorder import LineGather
 from catenary.solver.time_loop.views.channels import TrainLayout
 from catenary.solver.time_loop.views.observers import Stage

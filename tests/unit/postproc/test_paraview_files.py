@@ -17,12 +17,13 @@ import pytest
 import pyvista
 from matplotlib.colors import to_rgb
 from studies import few
+from watched_fields import blocks_at
 
 from catenary import RunBroken
+from catenary.postproc.film import open_in_paraview
 from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import MOTIONS
-from catenary.postproc.paraview import open_in_paraview
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 
@@ -44,6 +45,9 @@ def test_heads_arms_and_forces_are_where_the_record_has_them(folder: Path) -> No
         file["contact_wire/displacement"][:, 1] = aside
     script, *files = open_in_paraview.write_script(folder, None)
     assert script == folder / "paraview" / "view.py"
+    line = folder / "paraview" / "line.xdmf"
+    assert line == files[-1] and len(blocks_at(line, 0.5)["droppers"].cell_data) == 0
+    assert "contact_wire" in blocks_at(line, 0.5)
     with Results(folder) as results:
         data = FilmData(results)
     nodes = data.wires["contact_wire"]
@@ -171,7 +175,7 @@ def test_a_full_disk_ends_with_a_sentence(folder: Path) -> None:
     """And not with a crash: HDF5 would write again at the end of the program."""
     script = (
         "import resource, sys\nfrom pathlib import Path\n"
-        "from catenary.postproc.paraview.open_in_paraview import write_script\n"
+        "from catenary.postproc.film.open_in_paraview import write_script\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, resource.RLIM_INFINITY))\n"
         "write_script(Path(sys.argv[1]), None)"
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.postproc.paraview import open_in_paraview
+from catenary.postproc.film import open_in_paraview
 
 # What starts a program is run by processes of its own.
 pytestmark = pytest.mark.process

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.postproc.channels.header import in_sentence, places_on_train
 from catenary.postproc.evaluate.statistics import LateralRange, left_strips_sentence
+from catenary.postproc.files.header import in_sentence, places_on_train
 
 
 @pytest.mark.parametrize(

@@ -19,10 +19,12 @@ from catenary.postproc.record.snapshots.contents import (
     KINDS,
     MASTS,
     SLOPE,
+    BlockTables,
+    Course,
     FieldKind,
+    FieldRecord,
     blocks_of,
 )
-from catenary.postproc.record.snapshots.field_layout import BlockTables, Course, FieldRecord
 from catenary.postproc.record.snapshots.field_values import bending_moment
 from catenary.postproc.record.snapshots.fields import FieldRecorder
 

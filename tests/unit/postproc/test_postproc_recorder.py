@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from catenary import InputError, RunBroken
-from catenary.postproc.channels.header import Header
 from catenary.postproc.files import result_file
 from catenary.postproc.files.disk import NoRoom
+from catenary.postproc.files.header import Header
 from catenary.postproc.read.results import Results
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.report.summary import real_time_factor

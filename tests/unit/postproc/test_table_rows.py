@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from damaging import spoil_chunk
 
-from catenary.postproc.files.hdf5 import FORMAT_BOUNDS, DamagedClock, rows_before, shorten
+from catenary.postproc.files.hdf5 import FORMAT_BOUNDS, Damage, rows_before, shorten
 
 N, COLUMNS, CHUNK = 1050, 9, (100, 5)
 PACKED: dict[str, Any] = {"compression": "gzip", "shuffle": True}
@@ -63,5 +63,5 @@ def test_times_are_counted_and_not_guessed(tmp_path: Path) -> None:
     with h5py.File(path) as file:
         assert rows_before(file["time"], 1000, 998.5) == 999
         assert rows_before(file["time"], 1000, 5000.0) == 1000
-        with pytest.raises(DamagedClock, match="time is damaged"):
+        with pytest.raises(Damage, match="time is damaged"):
             rows_before(file["time"], N, 998.5)

@@ -8,10 +8,11 @@ pantographs are called by their places on the train.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from catenary.meshgen.wires import Role
 from catenary.solver.time_loop.views import channels
@@ -150,8 +151,14 @@ def _registration(line: Line, mesh: LineMesh, form: Equilibrium) -> dict[str, np
     }
 
 
-@dataclass(frozen=True)
-class LineRecord:
+Place = Annotated[float, Field(allow_inf_nan=False)]
+# Names of the record in the result file, where they differ.
+_IN_FILE = {
+    "every": "every_steps", "window": "window_m", "stretch": "stretch_m", "names": "channels",
+}  # fmt: skip
+
+
+class LineRecord(BaseModel):
     """Recorded part of the channels with a column for each arm, dropper or wire end.
 
     Attributes
@@ -165,12 +172,23 @@ class LineRecord:
     by_size : whether cadence, window and compression follow from the size of the whole record
     """
 
-    every: int = 1
-    window: tuple[float, float] | None = None
-    stretch: tuple[float, float] | None = None
-    names: tuple[str, ...] = field(default_factory=channels.line_channels)
+    model_config = ConfigDict(
+        frozen=True, validate_by_name=True, alias_generator=lambda name: _IN_FILE.get(name, name)
+    )
+
+    every: Annotated[int, Field(ge=1, le=10**9)] = 1
+    window: tuple[Place, Place] | None = None
+    stretch: tuple[Place, Place] | None = None
+    names: tuple[str, ...] = Field(default_factory=channels.line_channels)
     compression: str = NONE
     by_size: bool = False
+
+    @field_validator("names")
+    @classmethod
+    def _are_channels(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if not set(names) <= set(channels.line_channels()):
+            raise ValueError("no channels of the line")
+        return names
 
     @property
     def whole(self) -> bool:
@@ -185,7 +203,8 @@ class LineRecord:
     def of(self, train: channels.TrainLayout) -> LineRecord:
         """Return this record for a run with this train, which may lack some of the channels."""
         there = channels.line_channels(train)
-        return replace(self, names=tuple(name for name in self.names if name in there))
+        names = tuple(name for name in self.names if name in there)
+        return self.model_copy(update={"names": names})
 
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Indices of the columns at positions ``x`` [m] that are recorded, ascending."""
@@ -206,30 +225,6 @@ class LineRecord:
             return None
         behind, ahead = self.window
         return position.min(axis=1) - behind, position.max(axis=1) + ahead
-
-    def as_table(self) -> dict[str, Any]:
-        """Plain values for the result file; ``from_table`` gives the record again."""
-        return {
-            "every_steps": self.every,
-            "window_m": self.window,
-            "stretch_m": self.stretch,
-            "channels": list(self.names),
-            "compression": self.compression,
-            "by_size": self.by_size,
-        }
-
-
-def from_table(table: Mapping[str, Any]) -> LineRecord:
-    """The record that ``LineRecord.as_table`` described."""
-    window, stretch = table["window_m"], table["stretch_m"]
-    return LineRecord(
-        int(table["every_steps"]),
-        None if window is None else (float(window[0]), float(window[1])),
-        None if stretch is None else (float(stretch[0]), float(stretch[1])),
-        tuple(table["channels"]),
-        str(table["compression"]),
-        bool(table["by_size"]),
-    )
 
 
 def record_words(record: LineRecord, dt: float) -> str:

@@ -1,9 +1,10 @@
-"""Opens a run in ParaView: writes a script, what it shows beside the line, and a state.
+"""Opens a run in ParaView: writes a script, what it shows, and a state.
 
 What moves or stands beside the line (pantographs, contact forces, train, track) goes into XDMF
-files of one grid a time, with a common HDF5 file. Points are places at rest; a field
-``displacement`` moves them, as in ``fields.xdmf``, so that one factor draws all motions larger. The
-state opens a run without Python: ParaView's own program makes it from the script.
+files of one grid a time, with a common HDF5 file; one of the line names the snapshots that are
+there. Points are places at rest; a field ``displacement`` moves them, so that one factor draws all
+motions larger. The state opens a run without Python: ParaView's own program makes it from the
+script.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -23,7 +24,9 @@ from matplotlib.colors import to_rgb
 
 from catenary.base.errors import InputError
 from catenary.mbs.shape import Shape
+from catenary.postproc.files import xdmf
 from catenary.postproc.files.disk import unwritten, write_whole
+from catenary.postproc.files.own_files import FIELD_FILES
 from catenary.postproc.film.film_data import FilmData, Snapshots
 from catenary.postproc.film.options import View
 from catenary.postproc.film.scenery import (
@@ -45,7 +48,6 @@ _TEMPLATE = "view.py.template"
 # the room above the contact wire that the arrow of a mean force fills.
 _WIDTH, _ASPECT, _ARROW = 110.0, 1280.0 / 480.0, 0.4
 _NUMBERS = "scenery.h5"
-_CELLS = {1: "Polyvertex", 2: "Polyline", 4: "Quadrilateral"}
 STATE = "view.pvsm"
 PROGRAM, _SCREEN = "pvpython", "xvfb-run"
 # Longest that ParaView may take [s].
@@ -95,7 +97,7 @@ def write_script(
                 raise InputError(f"{target} is a link, through which nothing is written; remove it")
             try:
                 target.mkdir(exist_ok=True)
-                files = _write_beside_line(scenery, snapshots, target)
+                files = _write_shown(scenery, snapshots, target)
                 settings = _settings(target, scenery, snapshots, motion, look or scenery.best_view)
                 write_whole(
                     target / SCRIPT,
@@ -130,7 +132,6 @@ def _settings(
     places = np.linspace(colours.low, colours.high, len(MOTIONS))
     return {
         "folder": str(target.absolute()),
-        "line": "../fields.xdmf",
         "train": "",
         "blocks": [[name, scenery.line[name].kind] for name in snapshots.parts],
         "looks": {
@@ -159,24 +160,24 @@ def _settings(
     }  # fmt: skip
 
 
-def _write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
-    """Write the parts beside the line at the times of the snapshots into an existing folder;
-    returns the XDMF file of each by its name. OSError if they cannot be written."""
+def _write_shown(scenery: Scenery, snapshots: Snapshots, folder: Path) -> dict[str, Path]:
+    """Write the line, and the parts beside it at the times of the snapshots, into an existing
+    folder; returns the XDMF file of each by its name. OSError if they cannot be written."""
     data, grids = scenery.data, {name: list[str]() for name in scenery.parts}
     # In memory: HDF5 crashes the interpreter at its end where a disk has refused a write.
     with h5py.File(_NUMBERS, "w", driver="core", backing_store=False) as file:
         put = file.create_dataset
         still = {
             name: (
-                _topology(put(f"{name}/cells", data=part.cells.astype(np.int32))),
-                [put(f"{name}/{own}", data=values.astype(np.int32))
+                _item(put(f"{name}/cells", data=part.cells.astype(np.int32))),
+                [_values(put(f"{name}/{own}", data=values.astype(np.int32)), of_cells=True)
                  for own, values in part.fields.items()],
             )
             for name, part in scenery.parts.items()
         }  # fmt: skip
         for k, time in enumerate(snapshots.times.tolist()):
             for name, (rest, moved) in scenery.beside(time, snapshots.frame(time)).items():
-                moves, (topology, of_cells) = scenery.parts[name].moves, still[name]
+                moves, (cells, of_cells) = scenery.parts[name].moves, still[name]
                 if k and not moves:
                     continue
                 at = f"{name}/{k:06d}"
@@ -185,62 +186,29 @@ def _write_beside_line(scenery: Scenery, snapshots: Snapshots, folder: Path) -> 
                     force = np.zeros((data.n_pantographs, 3), dtype="<f4")
                     force[:, 2] = data.force[data.row_at(time)]
                     fields.append(put(f"{at}/force", data=force))
-                points = put(f"{at}/points", data=rest)
-                grids[name].append(
-                    _grid(topology, points, fields, of_cells, time if moves else None)
-                )
+                points = _item(put(f"{at}/points", data=rest))
+                values = [*map(_values, fields), *of_cells]
+                grids[name].append(xdmf.grid(name, cells, points, values, time if moves else None))
         file.flush()
         write_whole(folder / _NUMBERS, bytes(file.id.get_file_image()))
-    files = {name: folder / f"{name}.xdmf" for name in grids}
+    texts = {
+        name: xdmf.document(own[0] if len(own) == 1 else xdmf.collection(name, own))
+        for name, own in grids.items()
+    }
+    texts["line"] = snapshots.xdmf(f"../{FIELD_FILES[0]}")
+    files = {name: folder / f"{name}.xdmf" for name in texts}
     for name, path in files.items():
-        write_whole(path, _xdmf_text(name, grids[name]))
+        write_whole(path, texts[name])
     return files
 
 
-def _item(table: h5py.Dataset) -> str:
-    number = "Int" if table.dtype.kind == "i" else "Float"
-    return (
-        f'<DataItem Dimensions="{" ".join(map(str, table.shape))}" NumberType="{number}" '
-        f'Precision="{table.dtype.itemsize}" Format="HDF">{_NUMBERS}:{table.name}</DataItem>'
-    )
+def _item(table: h5py.Dataset) -> xdmf.Item:
+    return xdmf.Item(table.shape, table.dtype, f"{_NUMBERS}:{table.name}")
 
 
-def _topology(cells: h5py.Dataset) -> str:
-    n, each = cells.shape
-    return (
-        f'<Topology TopologyType="{_CELLS[each]}" NodesPerElement="{each}" '
-        f'NumberOfElements="{n}">{_item(cells)}</Topology>'
-    )
-
-
-def _grid(
-    topology: str,
-    points: h5py.Dataset,
-    of_nodes: Iterable[h5py.Dataset] = (),
-    of_cells: Iterable[h5py.Dataset] = (),
-    time: float | None = None,
-) -> str:
-    """Text of a grid, with fields named as their tables are."""
-    at = "" if time is None else f'<Time Value="{time!r}"/>'
-    parts = [at, topology, f'<Geometry GeometryType="XYZ">{_item(points)}</Geometry>']
-    for center, tables in (("Node", of_nodes), ("Cell", of_cells)):
-        for table in tables:
-            name, kind = Path(table.name).name, "Scalar" if table.ndim == 1 else "Vector"
-            parts.append(
-                f'<Attribute Name="{name}" AttributeType="{kind}" Center="{center}">'
-                f"{_item(table)}</Attribute>"
-            )
-    return "\n".join(parts)
-
-
-def _xdmf_text(name: str, grids: list[str]) -> str:
-    """A file of grids, of which several are one after another in time."""
-    whole = [f'<Grid Name="{name}" GridType="Uniform">{grid}\n</Grid>' for grid in grids]
-    if len(grids) > 1:
-        begin = f'<Grid Name="{name}" GridType="Collection" CollectionType="Temporal">'
-        whole = [begin, *whole, "</Grid>"]
-    head = '<?xml version="1.0" encoding="UTF-8"?>\n<Xdmf Version="3.0">\n<Domain>'
-    return "\n".join([head, *whole, "</Domain>\n</Xdmf>\n"])
+def _values(table: h5py.Dataset, of_cells: bool = False) -> xdmf.Values:
+    """A field that is named as its table is."""
+    return xdmf.Values(Path(table.name).name, _item(table), of_cells)
 
 
 def write_state(script: Path) -> tuple[Path | None, str]:
