@@ -9,10 +9,9 @@ import numpy as np
 from scipy import linalg
 
 from catenary.mbs.air import AirForces
-from catenary.mbs.head.newmark_head import SteppedHead, head_of
+from catenary.mbs.head.pantograph import SteppedHead, head_of
 from catenary.mbs.head.stepping import Raising, Stepping
 from catenary.mbs.lumped_data import LumpedData, chain_matrix
-from catenary.mbs.vehicle import lifted
 from catenary.solver.kernels import native
 
 # Half of the time over which the speed of a base that is lowered, too, is found [s]: a half cosine
@@ -119,32 +118,26 @@ class LumpedPantograph(SteppedHead):
         """Stiffness [N/m] and damping [N s/m] between the last mass and the base."""
         return self._base_stiffness, self._base_damping
 
-    def place(self, head_height: float, velocity: float = 0.0) -> None:
-        """Put the pantograph without contact to where its head is at this height [m]; see
-        `SteppedHead`. A base that rises starts there."""
+    def _place(self, head_height: float, velocity: float) -> None:
+        """A base that rises starts there."""
         self._started_at = head_height
-        super().place(head_height, velocity)
+        super()._place(head_height, velocity)
 
-    def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
+    def _put_inputs(self, times: np.ndarray, rows: np.ndarray, lifts: np.ndarray | None) -> None:
         part = self._part(times)
         rows["force"] = self._lift_full * part + self._base_stiffness * self._base_height
-        if self._tied or self._base is not None:
-            roof = np.zeros((2, times.size)) if self._base is None else self._base.lifts(times)[:2]
-            base = roof + self._rise(times) if self._tied else roof
+        if self._tied or lifts is not None:
+            base = np.zeros((2, times.size)) if lifts is None else lifts[:2]
+            base = base + self._rise(times) if self._tied else base
             rows["force"] += self._base_stiffness * base[0] + self._base_damping * base[1]
             if self._has_laws:
                 rows["base"], rows["base_velocity"] = base
-                rows["roof"], rows["roof_velocity"] = roof
         if self._air is not None:
             on_head, on_frame, _ = self._air.at(times).T
             rows["force"] += on_frame
             rows["head_air"] = on_head
         if self.is_regulated:
             rows["part"] = part
-
-    def base(self, time: float) -> float:
-        """Lift of the base by the vehicle [m]."""
-        return lifted(self._base, time)[0]
 
     def _rise(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Height and velocity of a base that rises with the lift, above where it stands under all

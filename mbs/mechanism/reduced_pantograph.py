@@ -21,12 +21,11 @@ import numpy as np
 
 from catenary.mbs.air import AirForces
 from catenary.mbs.head.laws import Law
-from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.head.pantograph import SteppedHead
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import ONE_STRIP, Strips, head_parts
 from catenary.mbs.mechanism.multibody_pantograph import Head
 from catenary.mbs.mechanism.reduction import ReducedMechanism
-from catenary.mbs.vehicle import lifted
 from catenary.solver.kernels import native
 
 
@@ -68,7 +67,7 @@ class RaisingPantograph(SteppedHead):
         head = head_parts(*data.head[:3], data.strips, roll)
         super().__init__(head, head.n + 1, stepping, air is None or air.is_steady)
         self._air = air
-        self._data = data
+        self._data, self._foot = data, data.base_height
         head_number = int(np.flatnonzero(head.level)[-1])
         self._put_laws(data.laws, (head_number, head.n), data.rest)
         self._masses = np.append(head.masses, 0.0)
@@ -82,17 +81,10 @@ class RaisingPantograph(SteppedHead):
         # NaN is none: the coupling refuses it.
         raise self._data.frame.left(left.height, time)
 
-    def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
+    def _put_inputs(self, times: np.ndarray, rows: np.ndarray, lifts: np.ndarray | None) -> None:
         rows["part"] = self._part(times)
-        if self._base is not None:
-            place, velocity, acceleration = self._base.lifts(times)
-            rows["base"] = rows["roof"] = place
-            rows["base_velocity"] = rows["roof_velocity"] = velocity
-            rows["base_acceleration"] = acceleration
+        if lifts is not None:
+            rows["base"], rows["base_velocity"], rows["base_acceleration"] = lifts
         if self._air is not None:
             rows["head_air"], rows["arm_air"], rows["bodies_air"] = self._air.at(times).T
             rows["head_air"] += self._data.blown_head * rows["bodies_air"]
-
-    def base(self, time: float) -> float:
-        """Height of the base at ``time`` [s], in the line's heights [m]."""
-        return self._data.base_height + lifted(self._base, time)[0]

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from catenary.base.errors import InputError
-from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.head.pantograph import SteppedHead
 from catenary.mbs.interface import N_DRIVE, drive_width, drives_by_name
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
@@ -383,7 +383,7 @@ def _term(matrix: sparse.csr_matrix, by: Sequence[float]) -> MatrixTerm:
 
 
 def _stepped(model: Any) -> SteppedHead:
-    if isinstance(model, SteppedHead) and not model.is_regulated:
+    if isinstance(model, SteppedHead) and not (model.is_regulated or model.is_lowered):
         return model
     raise InputError(
         "a pantograph has all its bodies in the time loop, is lowered, or its lift is regulated: "

@@ -187,11 +187,7 @@ class CompiledSteps:
         if number < 0:
             return True
         shown = self._showing.shown
-        if not native.keep(kept, number, shown.motion, shown.columns):
-            return False
-        # Heads that kernels call have not told them where they are now.
-        kept.kept_places[number] = np.concatenate(self.scheme.pantographs.places())
-        return True
+        return bool(native.keep(kept, number, shown.motion, shown.columns))
 
     def _take_on(self, end: int) -> tuple[bool, bool]:
         """Go on up to before index ``end`` as far as kernels can; whether the scheme has to finish

@@ -25,7 +25,7 @@ from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.scene import pantograph_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
-from catenary.mbs.lowering import Lowering
+from catenary.mbs.head.stepping import Lowering
 from catenary.mbs.lumped_data import LumpedData
 from catenary.solver.problem.problem import Damping, Problem
 

@@ -7,7 +7,7 @@ import gc
 import numpy as np
 import pytest
 
-from catenary.mbs.head.newmark_head import head_of
+from catenary.mbs.head.pantograph import head_of
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import drive_width, drives_by_name
 from catenary.mbs.lumped import LumpedPantograph

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from catenary.cases.run.description import description_of
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import Lowering, Stepping
 from catenary.mbs.interface import drive_width
-from catenary.mbs.lowering import Lowering
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.mbs.lumped_data import READY, LumpedData
 
