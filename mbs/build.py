@@ -15,8 +15,7 @@ from catenary.mbs.air import Airflow, AirForces, SteadyForces
 from catenary.mbs.head.laws import Regulator, given_way
 from catenary.mbs.head.pantograph import Pantograph, SteppedHead
 from catenary.mbs.head.stepping import Lowering, Stepping
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.multibody_pantograph import MultibodyData

@@ -20,11 +20,10 @@ from catenary.mbs.build import (
 )
 from catenary.mbs.head.pantograph import Pantograph
 from catenary.mbs.head.stepping import CrossingPath, FollowedPath, LateralPath, Stepping
-from catenary.mbs.interface import N_DRIVE
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.interface import N_DRIVE, HeadState
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.vehicle import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.responses import Heads
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem, Simulated
@@ -65,6 +64,27 @@ def _crossing(wires: ContactWires, wire: int, rake: float) -> tuple[np.ndarray, 
     middle = x - math.tan(rake) * y
     ascends = np.append(True, np.diff(np.maximum.accumulate(middle)) > 0.0)
     return middle[ascends], y[ascends]
+
+
+class Heads(HeadState):
+    """Heads over all n contacts of a train in one state; pantographs fill their parts of it.
+
+    The compliances are zero between strips of different pantographs. ``early_height`` and
+    ``early_velocity`` (n,) hold what an extrapolation of the motion says, if a coupling asks for
+    it.
+    """
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+        self.early_height = np.zeros(n)
+        self.early_velocity = np.zeros(n)
+
+    def put(self, strips: slice, head: HeadState) -> None:
+        """Copy the state of one pantograph's head to its ``strips``."""
+        self.height[strips] = head.height
+        self.velocity[strips] = head.velocity
+        self.height_compliance[strips, strips] = head.height_compliance
+        self.velocity_compliance[strips, strips] = head.velocity_compliance
 
 
 class Pantographs:

@@ -16,8 +16,7 @@ from variable_steps import integrate
 
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.stepping import LateralPath, Stepping
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.mechanism.multibody_pantograph import stand
 from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
 from catenary.mbs.rigid.bodies import Law

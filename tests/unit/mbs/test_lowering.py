@@ -8,7 +8,7 @@ import pytest
 from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.head.pantograph import Pantograph
 from catenary.mbs.head.stepping import Lowering, Raising, Stepping
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.vehicle import BaseMotion, Harmonic, VehicleMotion
 
 DATA = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))

@@ -18,7 +18,7 @@ from catenary.mbs.air import Polynomial, Tunnel, Uplift
 from catenary.mbs.head.laws import Law, Regulation
 from catenary.mbs.head.stepping import Lowering
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.vehicle import Harmonic, Irregularity, VehicleMotion
