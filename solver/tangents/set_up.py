@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -288,18 +289,11 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
     terms: list[MatrixTerm] = []
     if any(side.matrices is not now.matrices for side in sides):
         terms = _matrices(below.matrices, above.matrices, now.matrices, step)
-    return Change(
-        matrices=terms,
-        rest=or_none(of(lambda one: one.rest)),
-        links=or_none(of(lambda one: one.links)),
-        weights=or_none(of(lambda one: one.weights)),
-        heads=heads,
-        drives=or_one(drives),
-        law=or_none(of(lambda one: one.law)),
-        hertz=or_none(of(lambda one: one.hertz)),
-        start=start,
-        speed=speed,
-    )
+    parts = {
+        name: or_none(of(attrgetter(name))) for name in ("rest", "links", "weights", "law", "hertz")
+    }
+    drives = or_one(drives)
+    return Change(terms, heads=heads, drives=drives, start=start, speed=speed, **parts)
 
 
 def derivative(below: np.ndarray, above: np.ndarray, step: float) -> np.ndarray:

@@ -49,9 +49,9 @@ def generalised(force: Force, motion: Motion, time: float = 0.0) -> np.ndarray:
     """Generalised forces (6 n,) of a force alone, from the kinematics of its points."""
     if not isinstance(force, BetweenPoints):
         return force.generalised(motion, time)
-    line, (stiffness, free_length, damping, preload) = line_of(force, motion), force.linear
-    pull = stiffness * (line.length - free_length) + damping * line.rate + preload
-    pull += force.pull(line.length) if force.pull is not None else 0.0
+    line, law = line_of(force, motion), force.pull
+    pull = law.stiffness * (line.length - law.free_length) + law.damping * line.rate + law.preload
+    pull += 0.0 if law.of_length is None else law.of_length(line.length)
     return np.asarray(-pull * line.gradient)
 
 
