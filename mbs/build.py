@@ -19,7 +19,7 @@ from catenary.mbs.lumped import LumpedData, LumpedPantograph
 
 if TYPE_CHECKING:
     from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
-    from catenary.mbs.mechanism.reduced_pantograph import RaisingData
+    from catenary.mbs.mechanism.reduction import RaisingData
 
 # Data that describe a pantograph.
 PantographData: TypeAlias = "LumpedData | MultibodyData"
@@ -87,7 +87,7 @@ def _model(data: PantographData, operation: Operation) -> Pantograph:
 
         way = data.all_bodies
         return FullPantograph(data, pressing, height, stepping, air, way.handling, way.substeps)
-    from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+    from catenary.mbs.mechanism.reduction import RaisingPantograph
 
     raising = raising_data(data, pressing, height)
     if not operation.rolls:
@@ -142,7 +142,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     the arm by ``pressing`` [N]: the static force, and what the air lifts the arm with.
     """
     from catenary.mbs.mechanism.multibody_pantograph import head_lift, reduced, stand
-    from catenary.mbs.mechanism.reduced_pantograph import RaisingData
+    from catenary.mbs.mechanism.reduction import RaisingData
 
     standing = stand(data)
     head = standing.head

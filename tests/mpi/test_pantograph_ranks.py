@@ -97,7 +97,7 @@ def test_a_pantograph_that_cannot_go_on_ends_the_run_on_all_ranks(
 ) -> None:
     """Rank 0 alone moves it, and the others must not wait for what it cannot tell."""
     from catenary.mbs.mechanism.full_pantograph import FullPantograph
-    from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+    from catenary.mbs.mechanism.reduction import RaisingPantograph
 
     if MPI.COMM_WORLD.size == 1 and (scheme, motion) == ("one_solve", "reduced"):
         pytest.skip("on one rank the compiled loop of steps moves it")

@@ -9,8 +9,7 @@ from scipy import integrate, linalg
 from scipy.interpolate import CubicSpline
 
 from catenary import InputError
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.mbs.mechanism.reduction import RaisingPantograph, ReducedMechanism
 from catenary.mbs.rigid.bodies import Body, Law, Motion, Vector, normalised, point
 from catenary.mbs.rigid.forces import BetweenPoints, BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import ORIGIN, TimeLaw, unit

@@ -14,7 +14,7 @@ from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData, reduced
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 
 CASE, KIND = "ambrosio2012", "pantographs.seven_body"

@@ -18,7 +18,7 @@ from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.multibody_pantograph import stand
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.response import linearise
 from catenary.mbs.rigid.implicit_steps import METHODS
 from catenary.mbs.rigid.joints import PrescribedAngle

@@ -16,7 +16,7 @@ from catenary.mbs.build import raising_data
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.vehicle import BaseMotion, Harmonic, VehicleMotion
 
 MASS = 10.0

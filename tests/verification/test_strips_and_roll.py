@@ -17,7 +17,7 @@ from catenary.mbs.head.strips import Strips, Suspension, Turning
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.multibody_pantograph import stand
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium

@@ -105,7 +105,7 @@ struct HeadLaws {
     CATENARY_SHAPES("m n, m, *, s")
 };
 
-/// What raises a head, see mbs/mechanism/reduced_pantograph.py; its height is a coordinate.
+/// What raises a head, see mbs/mechanism/reduction.py; its height is a coordinate.
 struct ReducedMechanism {
     /// Columns of the tables; the last one may be missing.
     enum Column { kMass, kLift, kSlowing, kCarried, kBlown, kMostColumns };
