@@ -13,17 +13,13 @@ import numpy as np
 from catenary.base.errors import InputError
 from catenary.mbs.air import Airflow, AirForces, SteadyForces
 from catenary.mbs.head.laws import Regulator, given_way
-from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.interface import Pantograph
-from catenary.mbs.lowering import LoweredPantograph, Lowering
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.head.pantograph import Pantograph, SteppedHead
+from catenary.mbs.head.stepping import Lowering, Stepping
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 
 if TYPE_CHECKING:
-    from catenary.mbs.mechanism.full_pantograph import FullPantograph
     from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
-    from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
+    from catenary.mbs.mechanism.reduction import RaisingData
 
 # Data that describe a pantograph.
 PantographData: TypeAlias = "LumpedData | MultibodyData"
@@ -68,15 +64,14 @@ def make_pantograph(data: PantographData, operation: Operation) -> Pantograph:
             "Laws and regulated lifts act on lumped pantographs and on mechanisms that are reduced "
             "to tables, not on one with all its bodies in the loop."
         )
-    if operation.lowering is None:
-        return model
-    model.follow(operation.lowering.course(operation.static_force, operation.stepping.raise_time))
-    return LoweredPantograph(model, operation.lowering, operation.stepping.base)
+    lowering, raise_time = operation.lowering, operation.stepping.raise_time
+    if lowering is not None:
+        model.follow(lowering.course(operation.static_force, raise_time))
+        model.lower(lowering)
+    return model
 
 
-def _model(
-    data: PantographData, operation: Operation
-) -> FullPantograph | RaisingPantograph | LumpedPantograph:
+def _model(data: PantographData, operation: Operation) -> Pantograph:
     force, height, stepping = operation[:3]
     air, on_frame = None, 0.0
     if operation.air is not None and data.meets_air:
@@ -92,7 +87,7 @@ def _model(
 
         way = data.all_bodies
         return FullPantograph(data, pressing, height, stepping, air, way.handling, way.substeps)
-    from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+    from catenary.mbs.mechanism.reduction import RaisingPantograph
 
     raising = raising_data(data, pressing, height)
     if not operation.rolls:
@@ -147,7 +142,7 @@ def raising_data(data: MultibodyData, pressing: float, nominal_height: float) ->
     the arm by ``pressing`` [N]: the static force, and what the air lifts the arm with.
     """
     from catenary.mbs.mechanism.multibody_pantograph import head_lift, reduced, stand
-    from catenary.mbs.mechanism.reduced_pantograph import RaisingData
+    from catenary.mbs.mechanism.reduction import RaisingData
 
     standing = stand(data)
     head = standing.head

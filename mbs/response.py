@@ -25,7 +25,7 @@ from scipy.signal import find_peaks
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.head.strips import Strips, Suspension, head_parts
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, stand
 from catenary.mbs.rigid.bodies import Motion, Vector, point
 from catenary.mbs.rigid.forces import PointForce

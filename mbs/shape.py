@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
 from catenary.base.errors import InputError
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import HOLDER, MultibodyData, stand
 from catenary.mbs.rigid.bodies import SPACE, Motion, rotation_matrix
 from catenary.mbs.rigid.forces import BetweenPoints

@@ -30,9 +30,8 @@ from catenary.solver.contact.forces_on_line import FollowedLinks, ForceColumns, 
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import needs_form, simulated
 from catenary.solver.effects.build_model import build
-from catenary.solver.integrators.line_integrator import StationPasses
+from catenary.solver.integrators.line_integrator import StationPasses, make_line
 from catenary.solver.integrators.line_state import LineState
-from catenary.solver.integrators.make_line import make_line
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed
 from catenary.solver.model.links import Links

@@ -31,7 +31,7 @@ from catenary.cases.scene.run.incidents import (
 )
 from catenary.cases.scene.scene import Scene
 from catenary.mbs.head.strips import Strips
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate.wording import counted, wire_words

@@ -30,7 +30,7 @@ from catenary.cases.run.recording import (
 )
 from catenary.cases.scene.checks.mesh_size import estimate_march, estimate_memory, size_of
 from catenary.cases.scene.scene import Scene, problem_of, resolved
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.postproc.files.header import GZIP
 from catenary.postproc.files.run_schema import Chunk, chunks_of

@@ -38,7 +38,7 @@ from catenary.cases.scene.train.laws import laws_of, regulation_of, uplift_of
 from catenary.cases.scene.train.mechanism import Name
 from catenary.cases.scene.train.pantograph import MultibodyTable, PantographTable, wanted_force
 from catenary.cases.scene.train.train import TrainTable, VehicleTable, vehicle_of
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.vehicle import VehicleMotion
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line

@@ -37,7 +37,7 @@ from catenary.cases.studies.records import read_study
 from catenary.cases.studies.reference.judgement import FAILED, NOT_JUDGED, readers_table
 from catenary.cases.studies.reference.validation import VALIDATION
 from catenary.cases.studies.sweep.sweep import differences
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.shape import HEAD, SPRING, shape_of
 from catenary.meshgen.line import DropperKind, Line
 from catenary.meshgen.mesh import LineMesh

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from catenary.mbs.lumped_data import READY, ReadyPantograph
+from catenary.mbs.lumped import READY, ReadyPantograph
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import (

@@ -1,7 +1,7 @@
 """Steps in which a pantograph runs, and what moves it in them besides its contact forces.
 
-It is raised, its base moves, and the wire crosses its strips: at its own lateral place less the
-vehicle's sway.
+It is raised and may be lowered, its base moves, and the wire crosses its strips: at its own lateral
+place less the vehicle's sway.
 """
 
 from __future__ import annotations
@@ -40,6 +40,36 @@ class Raising:
             turned = np.pi * times[rising] / self.raise_time
             found[rising] = np.pi / (2.0 * self.raise_time) * np.sin(turned)
         return found
+
+
+@dataclass(frozen=True)
+class Lowering:
+    """Lowering of a pantograph from ``time`` [s] on.
+
+    The static force goes over to ``force`` [N] over ``within`` [s] by half a cosine; a negative one
+    pulls down. The head is caught ``drop`` [m] below where it was at ``time``, as models have no
+    housing of their own: its speed relative to the base falls to zero at once, and it moves with
+    the base.
+    """
+
+    time: float
+    force: float
+    within: float
+    drop: float
+
+    def course(self, static_force: float, raise_time: float) -> Part:
+        """Part of the lift that acts, after a raising over ``raise_time`` [s] to ``static_force``
+        [N]."""
+        rising, falling = Raising(raise_time), Raising(self.within)
+        before = rising(self.time)
+        last = self.force / static_force
+
+        def part(times: float | np.ndarray) -> np.ndarray:
+            since = np.maximum(times - np.float64(self.time), 0.0)
+            lowered = before + (last - before) * falling(since)
+            return np.where(since > 0.0, lowered, rising(times))
+
+        return part
 
 
 class Stepping(NamedTuple):

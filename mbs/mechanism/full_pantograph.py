@@ -15,8 +15,8 @@ import numpy as np
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import ON_FRAME, ON_HEAD, SQUARE, AirForces
+from catenary.mbs.head.pantograph import NO_TIME, Pantograph, weakly
 from catenary.mbs.head.stepping import Part, Raising, Stepping
-from catenary.mbs.interface import HeadState
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
 from catenary.mbs.rigid.bodies import SPACE, Motion, body_products
 from catenary.mbs.rigid.forces import PointForce
@@ -63,7 +63,7 @@ def _blown(data: MultibodyData, air: AirForces | None) -> tuple[PointForce, ...]
     return tuple(forces)
 
 
-class FullPantograph:
+class FullPantograph(Pantograph):
     """All bodies of a multibody pantograph, implicit in the contact forces.
 
     Links between two balls do not spin, strips have no suspension of their own.
@@ -101,7 +101,8 @@ class FullPantograph:
             )
         standing = stand(data)
         raise_time, dt, beta, gamma, self._lateral, base = stepping
-        self._data, self._dt, self._base = data, dt, base
+        super().__init__(data.strips.contact_offsets, base)
+        self._data, self._dt = data, dt
         # Part of the lift that acts, and what holds the arm down without any of it [N].
         self._part: Part = Raising(raise_time)
         self._held = 0.0
@@ -116,25 +117,27 @@ class FullPantograph:
         self._rest = standing.motion
         # Heights of the head above the base, with the arm at its working height.
         alone = float(standing.motion.position[standing.motion.numbers[data.head], 2])
-        self._zero = nominal_height - (alone - pressing / standing.head.stiffness)
-        s, space = len(data.strips.contact_offsets), self._rest.numbers[SPACE]
+        self._foot = nominal_height - (alone - pressing / standing.head.stiffness)
+        s, space = len(self.strip_offsets), self._rest.numbers[SPACE]
         # Heights of the points that touch the wire.
         self._heights = np.zeros(s, dtype=native.BODY_PRODUCT)
         self._heights["body"], self._heights["normal"] = space, (0.0, 0.0, 1.0)
         self._heights["start"], self._heights["end"] = space, self._rest.numbers[data.head]
         self._heights["between"] = True
         self._points = self._heights["at_end"]
-        self._points[:, 0] = data.strips.contact_offsets
+        self._points[:, 0] = self.strip_offsets
         # Generalised forces (6 n, s) of unit contact forces, downward.
         pushed = lambda motion: -self._touching(motion)[1].T  # noqa: E731
         self._stepper = Stepper(system, dt, handling, pushed, substeps, beta, gamma)
         self._stepper.begin(standing.motion, 0.0)
         self._early = np.zeros((2, s))
-        self._head = HeadState(s)
-
-    @property
-    def strip_offsets(self) -> tuple[float, ...]:
-        return self._data.strips.contact_offsets
+        self._bodies = np.zeros(7 * self.motion.n_bodies)
+        # It has no coordinates that kernels know.
+        none = np.zeros((2, s, 0)), np.zeros(0)
+        arrays = native.HeadArrays(*none, self.head.numbers, NO_TIME, -1)
+        self.stepped = native.CalledHead(arrays, weakly(self._predict))
+        self.stepped.then(weakly(self._advance))
+        self._note()
 
     @property
     def system(self) -> System:
@@ -147,37 +150,25 @@ class FullPantograph:
         return self._stepper.motion
 
     def follow(self, part: Part) -> None:
-        """Scale the lift by ``part``; where it is negative, the arm is pulled down."""
         self._part = part
 
     def _holding(self, time: float) -> tuple[float, float, float]:
         """What holds the arm down until the pantograph is raised [N]."""
         return 0.0, 0.0, -self._held * (1.0 - float(self._part(time)))
 
-    def constraint_violation(self) -> float:
-        """Largest error of a row of the joints now [m, cosine]."""
-        return self._stepper.violation()
-
-    def place(self, head_height: float, velocity: float = 0.0) -> None:
-        """Put the pantograph where its head is at this height [m], without contact.
-
-        ``velocity`` [m/s]: upward, of head and arm, all other bodies as the joints require. Both
-        count from the line, also where the base moves.
-
-        Raises
-        ------
-        RunBroken
-            The head does not reach this height.
-        """
+    def _place(self, head_height: float, velocity: float) -> None:
+        """``velocity`` is that of head and arm, all other bodies as the joints require. Both count
+        from the line, also where the base moves."""
         try:
-            self._place(head_height, velocity)
+            self._place_on_arm(head_height, velocity)
         except InputError as error:
             raise self._beyond_reach(head_height) from error
+        self._note()
 
-    def _place(self, head_height: float, velocity: float) -> None:
+    def _place_on_arm(self, head_height: float, velocity: float) -> None:
         data, number = self._data, self._rest.numbers[self._data.head]
         lift, rising = lifted(self._base, 0.0)
-        wanted, velocity = head_height - self._zero - lift, velocity - rising
+        wanted, velocity = head_height - self._foot - lift, velocity - rising
         motion = self._rest
         arm = wanted - stand(data).head.offset
         for _ in range(20):
@@ -199,19 +190,19 @@ class FullPantograph:
         self._aim(0.0)
         self._stepper.begin(motion, 0.0)
 
-    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Heights and velocities (s,) of the strips at ``time`` [s] by Newmark's predictor."""
+    def _extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         self._aim(time)
         dt, stepper = self._dt, self._stepper
         heights, gradients = self._touching(stepper.motion)
         velocities, pushed = stepper.motion.velocities, stepper.acceleration
-        self._early[0] = self._zero + heights
+        self._early[0] = self._foot + heights
         self._early[0] += gradients @ (dt * velocities + 0.5 * dt**2 * pushed)
         self._early[1] = gradients @ (velocities + dt * pushed)
         self._add_base(time, self._early[0], self._early[1], stepper.motion)
         return self._early[0], self._early[1]
 
-    def predict(self, time: float) -> HeadState:
+    def _predict(self, time: float) -> None:
+        """Fill in the strips at ``time`` [s]."""
         self._aim(time)
         # The loop's clock counts: a restart begins at any time.
         self._stepper.time = time - self._dt
@@ -219,47 +210,44 @@ class FullPantograph:
             found = self._stepper.predict(time)
         displacement, velocity, _ = found.changes(np.zeros(len(self._points)))
         heights, gradients = self._touching(found.motion)
-        head = self._head
-        head.height[:] = self._zero + heights + gradients @ displacement
+        head = self.head
+        head.height[:] = self._foot + heights + gradients @ displacement
         head.velocity[:] = gradients @ (found.motion.velocities + velocity)
         head.height_compliance[:] = -gradients @ found.by_force[0]
         head.velocity_compliance[:] = -gradients @ found.by_force[1]
         self._add_base(time, head.height, head.velocity, found.motion)
-        return head
 
-    def advance(self, contact_force: np.ndarray) -> None:
-        """Take the step predicted last with these contact forces (s,) [N].
-
-        Raises
-        ------
-        RunBroken
-            Its joints cannot be kept closed, or numbers are not finite.
-        """
+    def _advance(self, time: float, contact_force: np.ndarray) -> None:
+        """Take the step to ``time`` [s]; RunBroken if joints cannot be kept closed, or numbers are
+        not finite."""
         with self._named():
-            self._stepper.advance(np.asarray(contact_force, dtype=float))
+            self._stepper.advance(contact_force)
+        self._note()
 
-    def state(self) -> np.ndarray:
+    def _note(self) -> None:
+        """Note where bodies are now, and how open joints are."""
+        motion = self.motion
+        np.concatenate(
+            [motion.position[:-1].ravel(), motion.parameters[:-1].ravel()], out=self._bodies
+        )
+        self.violation[0] = self._stepper.violation()
+
+    def _own_state(self) -> list[np.ndarray]:
         """Places, velocities, accelerations, contact forces, and what holds it down."""
         stepper = self._stepper
-        more = [stepper.acceleration, stepper.forces, [self._held]]
-        return np.concatenate([stepper.motion.to_vector(), *more])
+        held = np.array([self._held])
+        return [stepper.motion.to_vector(), stepper.acceleration, stepper.forces, held]
 
-    def restore(self, state: np.ndarray) -> None:
+    def _restore(self, state: np.ndarray) -> None:
         stepper, n = self._stepper, self.motion.n_bodies
-        values = np.array(state, dtype=float)
-        stepper.motion = stepper.motion.restored(values[: 13 * n])
-        stepper.acceleration = values[13 * n : 19 * n]
-        stepper.forces = values[19 * n : -1]
-        self._held = float(values[-1])
+        stepper.motion = stepper.motion.restored(state[: 13 * n])
+        stepper.acceleration = state[13 * n : 19 * n]
+        stepper.forces = state[19 * n : -1]
+        self._held = float(state[-1])
+        self._note()
 
     def places(self) -> np.ndarray:
-        """Positions (n, 3) [m] and Euler parameters (n, 4) of the bodies, one after the other."""
-        motion = self.motion
-        return np.concatenate([motion.position[:-1].ravel(), motion.parameters[:-1].ravel()])
-
-    def base(self, time: float) -> float:
-        """Height of the base at ``time`` [s], in the line's heights [m]."""
-        return self._zero + lifted(self._base, time)[0]
+        return self._bodies
 
     @contextmanager
     def _named(self) -> Iterator[None]:
@@ -272,7 +260,7 @@ class FullPantograph:
     def _beyond_reach(self, head_height: float) -> RunBroken:
         return RunBroken(
             f"The head of pantograph {self._data.name!r} does not reach a wire at a height of "
-            f"{head_height:.4g} m: {head_height - self._zero:.4g} m above its base."
+            f"{head_height:.4g} m: {head_height - self._foot:.4g} m above its base."
         )
 
     def _aim(self, time: float) -> None:

@@ -18,7 +18,7 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.mbs.air import Uplift
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.strips import ONE_STRIP, Strips, Turning
-from catenary.mbs.mechanism.reduction import Raised, ReducedMechanism, reduce_mechanism
+from catenary.mbs.mechanism.reduction import Head, Raised, ReducedMechanism, reduce_mechanism
 from catenary.mbs.rigid.bodies import Motion
 from catenary.mbs.rigid.forces import Force, Gravity, PointForce, SpringDamper, gradient_of
 from catenary.mbs.rigid.joints import Constant, Joint, PrescribedPoint
@@ -102,20 +102,6 @@ class MultibodyData:
     def roll(self) -> Turning | None:
         """Roll of the head about the track as its joints allow it, None if they do not."""
         return stand(self).head.roll
-
-
-class Head(NamedTuple):
-    """The head on its arm: ``mass`` [kg], ``stiffness`` [N/m] and ``damping`` [N s/m] of what
-    carries it, ``weight`` [N], ``offset`` [m] above the arm at rest without contact; ``roll`` about
-    the track and ``pitch`` across it, None if its joints do not allow it."""
-
-    mass: float
-    stiffness: float
-    damping: float
-    weight: float
-    offset: float
-    roll: Turning | None = None
-    pitch: Turning | None = None
 
 
 class Standing(NamedTuple):

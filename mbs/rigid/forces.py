@@ -8,6 +8,7 @@ Source: P. E. Nikravesh, Computer-aided analysis of mechanical systems, 1988, ch
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
@@ -53,13 +54,20 @@ class Table:
 Characteristic = float | Callable[[float], float]
 
 
-@dataclass(frozen=True)
-class BetweenPoints:
-    """A force along the line between a point of body i and a point of body j.
+class Pull(NamedTuple):
+    """Pull ``stiffness`` (length - ``free_length``) + ``damping`` d length / dt + ``preload`` of a
+    line [N/m], [m], [N s/m], [N], and what a function ``of_length`` [m] says besides [N]."""
 
-    It pulls them together by k (length - free length) + c d length / dt + preload, and by what
-    ``pull`` says of the length [m], if it is a function [N].
-    """
+    stiffness: float = 0.0
+    free_length: float = 0.0
+    damping: float = 0.0
+    preload: float = 0.0
+    of_length: Callable[[float], float] | None = None
+
+
+@dataclass(frozen=True)
+class BetweenPoints(ABC):
+    """A force along the line between a point of body i and a point of body j."""
 
     name: str
     i: str
@@ -68,14 +76,9 @@ class BetweenPoints:
     at_j: Vector = ORIGIN
 
     @property
-    def linear(self) -> tuple[float, float, float, float]:
-        """k [N/m], free length [m], c [N s/m], preload [N]."""
-        return 0.0, 0.0, 0.0, 0.0
-
-    @property
-    def pull(self) -> Callable[[float], float] | None:
-        """Pull [N] at a length [m] besides, None without."""
-        return None
+    @abstractmethod
+    def pull(self) -> Pull:
+        """With what it pulls them together."""
 
 
 @dataclass(frozen=True)
@@ -91,16 +94,11 @@ class SpringDamper(BetweenPoints):
     damping: float = 0.0
 
     @property
-    def linear(self) -> tuple[float, float, float, float]:
-        """Its constants, but for a stiffness that is a function."""
-        stiffness = 0.0 if callable(self.stiffness) else self.stiffness
-        return stiffness, self.free_length, self.damping, 0.0
-
-    @property
-    def pull(self) -> Callable[[float], float] | None:
-        """That function of the extension, over the length."""
+    def pull(self) -> Pull:
         law, free = self.stiffness, self.free_length
-        return (lambda length: law(length - free)) if callable(law) else None
+        if callable(law):
+            return Pull(damping=self.damping, of_length=lambda length: law(length - free))
+        return Pull(law, free, self.damping)
 
 
 @dataclass(frozen=True)
@@ -110,9 +108,8 @@ class Actuator(BetweenPoints):
     force: float = 0.0
 
     @property
-    def linear(self) -> tuple[float, float, float, float]:
-        """Minus its push."""
-        return 0.0, 0.0, 0.0, -self.force
+    def pull(self) -> Pull:
+        return Pull(preload=-self.force)
 
 
 @dataclass(frozen=True)
@@ -127,11 +124,12 @@ class BumpStop(BetweenPoints):
     stiffness: float = 0.0
 
     @property
-    def pull(self) -> Callable[[float], float]:
-        """Pull of the stop that is met."""
-        return lambda length: (
-            self.stiffness * (max(length - self.longest, 0.0) - max(self.shortest - length, 0.0))
-        )
+    def pull(self) -> Pull:
+        def of_length(length: float) -> float:
+            beyond = max(length - self.longest, 0.0) - max(self.shortest - length, 0.0)
+            return self.stiffness * beyond
+
+        return Pull(of_length=of_length)
 
 
 class OffLine(Protocol):
@@ -224,9 +222,10 @@ class FlatLines:
         self._rows["j"] = [number_of(start, force.j) for force in lines]
         self._rows["at_i"] = vectors([force.at_i for force in lines])
         self._rows["at_j"] = vectors([force.at_j for force in lines])
-        constants = np.array([force.linear for force in lines], dtype=float).reshape(-1, 4)
+        pulls = [force.pull for force in lines]
+        constants = np.array([pull[:4] for pull in pulls], dtype=float).reshape(-1, 4)
         self._stiffness, self._free, self.damping, self._preload = constants.T.copy()
-        self._pulls = [(k, force.pull) for k, force in enumerate(lines) if force.pull]
+        self._pulls = [(k, pull.of_length) for k, pull in enumerate(pulls) if pull.of_length]
 
     def geometry(self, motion: Motion) -> LineGeometry:
         """Geometry of the lines in a motion.

@@ -10,7 +10,6 @@ import numpy as np
 
 from catenary.base.mpi import MPI
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.responses import LineResponse
 from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import LineState
 from catenary.solver.kernels import native
@@ -368,16 +367,16 @@ class ForcesOnLine:
                 everything = self._across if self._comm.rank == 0 else None
                 self._comm.Reduce(self._share_across, everything, op=MPI.SUM, root=0)
 
-    def responder(self, response: LineResponse) -> Callable[[], None]:
+    def responder(self, share: native.Share) -> Callable[[], None]:
         """Function that fills in this rank's share of the inner problem.
 
         It is called after ``place`` and the free solve.
 
         The line must then hold the end of the step without contact forces and compensations, and
         the links their reserve there, as a free step leaves them. Links are included if they may
-        switch within the response's bounds.
+        switch within the share's bounds.
         """
-        return native.respond.bound(self.contacts, response.share)
+        return native.respond.bound(self.contacts, share)
 
     def superpose(
         self, contact_force: np.ndarray, links: np.ndarray, compensation: np.ndarray

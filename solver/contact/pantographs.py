@@ -6,8 +6,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -19,22 +18,17 @@ from catenary.mbs.build import (
     make_pantograph,
     steady_forces,
 )
-from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.head.pantograph import Pantograph
 from catenary.mbs.head.stepping import CrossingPath, FollowedPath, LateralPath, Stepping
-from catenary.mbs.interface import N_DRIVE, Pantograph, called_by_kernels, drives_by_name
-from catenary.mbs.lowering import LoweredPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.interface import N_DRIVE, HeadState
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.vehicle import BaseMotion
 from catenary.solver.contact.contact_wire import Candidates, ContactWires
-from catenary.solver.contact.responses import Heads
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.problem import Placement, Problem, Simulated
 from catenary.solver.statics.elasticity import Elasticity
 from catenary.solver.wind import airflow
-
-if TYPE_CHECKING:
-    from catenary.mbs.mechanism.full_pantograph import FullPantograph
 
 
 def leads_of(wires: ContactWires, wire: np.ndarray, rake: np.ndarray) -> native.Leads:
@@ -70,6 +64,27 @@ def _crossing(wires: ContactWires, wire: int, rake: float) -> tuple[np.ndarray, 
     middle = x - math.tan(rake) * y
     ascends = np.append(True, np.diff(np.maximum.accumulate(middle)) > 0.0)
     return middle[ascends], y[ascends]
+
+
+class Heads(HeadState):
+    """Heads over all n contacts of a train in one state; pantographs fill their parts of it.
+
+    The compliances are zero between strips of different pantographs. ``early_height`` and
+    ``early_velocity`` (n,) hold what an extrapolation of the motion says, if a coupling asks for
+    it.
+    """
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+        self.early_height = np.zeros(n)
+        self.early_velocity = np.zeros(n)
+
+    def put(self, strips: slice, head: HeadState) -> None:
+        """Copy the state of one pantograph's head to its ``strips``."""
+        self.height[strips] = head.height
+        self.velocity[strips] = head.velocity
+        self.height_compliance[strips, strips] = head.height_compliance
+        self.velocity_compliance[strips, strips] = head.velocity_compliance
 
 
 class Pantographs:
@@ -180,8 +195,7 @@ class Pantographs:
         self.across = np.zeros((3, self.n_contacts if simulated.lateral else 0))
         self.lateral_displacement = self.across[2]
         self.lateral_place = np.zeros(self.lateral_displacement.size)
-        self._has_joints = [has_joints(placement.data) for placement in train.placements]
-        self.joints_in_loop = any(self._has_joints)
+        self.joints_in_loop = any(has_joints(placement.data) for placement in train.placements)
         self.constraint_violation[:] = np.nan
         self.models: list[Pantograph] = []
         self.along_track = False
@@ -262,8 +276,6 @@ class Pantographs:
         """
         for model, strips in self._models_with_contacts:
             model.advance(contact_force[strips])
-        if self.joints_in_loop:
-            self.measure_joints()
         self._write_outputs(contact_force, reported, self._heads.affine, depth)
 
     def places(self) -> list[np.ndarray]:
@@ -275,47 +287,19 @@ class Pantographs:
         return [model.base(time) for model in self.models]
 
     def heads_in_loop(self) -> tuple[list[native.Head], list[np.ndarray]]:
-        """The heads as a loop of kernels steps them, and where it keeps ``places``.
-
-        Those that no kernel steps, it calls.
-        """
-        heads, places = [], []
-        for number, (model, strips) in enumerate(self._models_with_contacts):
-            moved = model.model if isinstance(model, LoweredPantograph) else model
-            if isinstance(moved, SteppedHead) and not moved.by_hand:
-                heads.append(moved.stepped)
-                places.append(moved.places())
-            else:
-                head, _, own = called_by_kernels(model, partial(self._measure_joint, number))
-                heads.append(head)
-                places.append(own)
-            heads[-1].first = strips.start
-        return heads, places
+        """The heads as a loop of kernels steps them, and ``places``, which it keeps up to date."""
+        return [model.stepped for model in self.models], self.places()
 
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
         """Fill in what ``heads_in_loop`` depend on in steps to ``times`` [s].
 
         ``drives`` (len(times), n, `interface.drive_width`).
         """
-        drives_by_name(drives)["time"] = times[:, None]
         for number, model in enumerate(self.models):
-            if isinstance(model, SteppedHead | LoweredPantograph):
-                model.fill_drives(times, drives[:, number])
+            model.fill_drives(times, drives[:, number])
             if self._followed:
                 path = self._followed[number]
                 path.fill_ahead(times, drives[:, number, N_DRIVE : N_DRIVE + 2 * path.place.size])
-
-    def measure_joints(self) -> None:
-        """Measure the violation of the joint constraints; no effect on ranks without models."""
-        for number in range(len(self.models)):
-            self._measure_joint(number)
-
-    def _measure_joint(self, number: int) -> None:
-        if self._has_joints[number]:
-            model = self.models[number]
-            moved = model.model if isinstance(model, LoweredPantograph) else model
-            jointed = cast("FullPantograph", moved)
-            self.constraint_violation[number] = jointed.constraint_violation()
 
     def take_over(self, other: Pantographs) -> None:
         """Take over the state of ``other``, the same train at another time step. Not collective."""
@@ -365,10 +349,11 @@ class Pantographs:
                 simulated.head_roll,
             )
             model = make_pantograph(data, operation)
+            model.violation = self.constraint_violation[number : number + 1]
+            model.stepped.first = self._contacts[number].start
             model.place(float(self.head_height[number]), float(velocity[number]))
             self.models.append(model)
         self._models_with_contacts = list(zip(self.models, self._contacts, strict=True))
-        self.measure_joints()
 
 
 def _simulated(placement: Placement, simulated: Simulated, n_wires: int) -> PantographData:

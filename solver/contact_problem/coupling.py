@@ -40,7 +40,8 @@ import numpy as np
 
 from catenary.base.errors import NotConverged, RunBroken
 from catenary.mbs.interface import affine
-from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact.pantographs import Heads
+from catenary.solver.contact_problem.force_exchange import LineResponse
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 from catenary.solver.problem.problem import Numerics

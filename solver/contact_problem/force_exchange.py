@@ -1,5 +1,7 @@
 """The step's messages: every rank's share of the inner problem to rank 0, the forces back.
 
+Python takes named views of the numbers that a rank sends of the line's side.
+
 One reduction to rank 0 and one broadcast of fixed size a step, whatever the number of ranks; what
 a rank sends besides are rows of links that may switch, if it owns any. Both also carry the wish
 to stop and the news of a failure, so that all ranks leave the loop at the same step.
@@ -14,13 +16,83 @@ import numpy as np
 
 from catenary.base.mpi import MPI
 from catenary.base.petsc import event
-from catenary.solver.contact.responses import LineResponse
+from catenary.mbs.interface import affine
 from catenary.solver.kernels import native
+from catenary.solver.kernels.native import FLAGS, Bounds, LinkRows, Share
 
 _FIRST_CAPACITY = 32
 # Numbers before the forces in a reply, and the tag of rows.
 _HEAD, _ROWS = 4, 7
 _NO_NUMBERS, _NO_FORCES = np.zeros(0, dtype=np.int64), np.zeros(0)
+# Numbers that add up over ranks besides answers.
+N_FLAGS = FLAGS.itemsize // 8
+
+
+class LineResponse:
+    """Answers of the line to n contacts, and a row for each link that may switch.
+
+    Attributes
+    ----------
+    summed : everything that adds up over ranks, in one array
+    line : Affine, free heights [m] and total rates [m/s] of the wire at the contacts; its views
+    present : (n,) 1 for contacts whose wire is on the strip, else 0; the same on all ranks
+    early_height, early_rate : (n,) wire heights [m] and rates [m/s] extrapolated from the line's
+        motion; (0,) without ``early``
+    rows : ``native.LinkRows``, whose ``numbers`` (capacity, 2 + 3 n) are sent
+    share : Share, all this as kernels take it
+    bounds : Bounds; kept by reference
+
+    Parameters
+    ----------
+    n_contacts, capacity : number of contacts, and of links that have room
+    early : whether there is room for extrapolated heights and rates
+    bounds : unlimited if not given
+    """
+
+    def __init__(
+        self,
+        n_contacts: int,
+        capacity: int,
+        early: bool = False,
+        bounds: Bounds | None = None,
+    ) -> None:
+        n, n_early = n_contacts, n_contacts if early else 0
+        self.n_contacts, self.capacity = n, capacity
+        sizes = (N_FLAGS, 2 * n * (1 + n), n_early, n_early)
+        self.summed = np.zeros(sum(sizes))
+        flags, answers, self.early_height, self.early_rate = np.split(
+            self.summed, np.cumsum(sizes)[:-1]
+        )
+        self.line = affine(answers, n)
+        self.rows = LinkRows(np.zeros((capacity, 2 + 3 * n)))
+        self.present = np.ones(n)
+        self.bounds = bounds or Bounds(*(np.full(size, np.inf) for size in (n, n, 1)))
+        self.share = Share(flags.view(FLAGS), self.present, self.line, self.rows, self.bounds)
+
+    @property
+    def count(self) -> int:
+        """Number of links that may switch and have a row."""
+        return int(self.summed[0])
+
+    @count.setter
+    def count(self, count: int) -> None:
+        self.summed[0] = count
+
+    @property
+    def flags(self) -> tuple[float, float, float, float]:
+        """Number of links with a row, and over all ranks: whether one ends the march with this
+        step, whether one holds NaN or infinity, and the number of links without room."""
+        count, stop, broken, missing = self.summed[:N_FLAGS].tolist()
+        return count, stop, broken, missing
+
+    def put_stop(self, stop: bool) -> None:
+        """Set whether this rank ends the march with this step."""
+        self.summed[1] = stop
+
+    @property
+    def links(self) -> np.ndarray:
+        """Numbers of the links with a row (m,)."""
+        return self.rows.numbers[: self.count, 0].astype(np.int64)
 
 
 class Verdict(IntEnum):

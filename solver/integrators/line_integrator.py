@@ -1,5 +1,19 @@
 """The line's state, step operator and steps, whichever method of Newmark's family advances it.
 
+Newmark's method (paper eqs. 2.4-2.6) is the generalized-alpha method with weights of zero; HHT is
+another member. It balances forces between two states,
+M a(1 - a_m) + C v(1 - a_f) + K d(1 - a_f) = f(1 - a_f). Let b be the acceleration that balances
+the forces at the end of each step itself, M b = f - C v - K d. As the equations are linear in
+M, C, K and f, the method is the same as
+
+    (1 - a_m) a_new + a_m a_old = (1 - a_f) b_new + a_f b_old                            (*)
+
+with Newmark's formulas in a. So a step has the form of Newmark's with b in place of a: no force of
+an earlier step is needed, contacts and droppers meet the state at the end of the step, and one
+product with K is enough. With r = (1 - a_f) / (1 - a_m) it is a = p + r b, p being known when a
+step begins: sigma = r beta dt^2, tau = r gamma dt. Source of (*): M. Arnold, O. Brüls, Multibody
+Syst. Dyn. 18 (2007) 185-202.
+
 The step operator A = M + tau C + sigma K is factored once, sigma and tau being what displacement
 and velocity gain from the step's unknown acceleration. With proportional damping the step's
 right-hand side needs a single product with K: M v is eliminated by A itself.
@@ -13,9 +27,8 @@ side by side, each of which waits for itself only.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cached_property, partial
 from itertools import starmap
 from typing import Any
 
@@ -25,8 +38,17 @@ from catenary.base.mpi import MPI
 from catenary.base.parallel import total
 from catenary.base.petsc import PETSc
 from catenary.solver.integrators.line_loads import LineLoads
-from catenary.solver.integrators.line_state import LineState, PredictedLineState
-from catenary.solver.integrators.slow_path import GENERAL, LIBRARY, PARTS, SlowPath
+from catenary.solver.integrators.line_state import AlphaAhead, LineState, PredictedLineState
+from catenary.solver.integrators.slow_path import (
+    CALLED,
+    GENERAL,
+    LIBRARY,
+    PARTS,
+    SlowPath,
+    slow_load,
+    slow_method,
+    warn_of_slow_path,
+)
 from catenary.solver.kernels import aligned_arrays, native
 from catenary.solver.linear.pieces import WantedPieces
 from catenary.solver.linear.step_operators import ByStations, LineOperators, Loads
@@ -35,6 +57,8 @@ from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import NO_LINKS
+from catenary.solver.problem.integrator_parameters import Integration, integration_of
+from catenary.solver.problem.problem import Numerics
 from catenary.solver.window.moving_window import MovingWindow
 
 # Arrays of every state of a line.
@@ -43,9 +67,11 @@ MOTION = ("displacement", "velocity", "acceleration")
 # memory to be read ahead, 64 kB of each array, which a cache next to a processor holds.
 _STRETCH = 8192
 _NO_LOADS = np.zeros(0)
+# Share of dt^2 below which the acceleration cannot be found from what a prediction takes from it.
+_LEAST_SHARE = 1e-3
 
 
-class LineIntegrator(ABC):
+class LineIntegrator:
     """State and step operator of the distributed line, relative to its equilibrium.
 
     Collective to make; ``destroy`` is collective too. Arrays are this rank's part, shape
@@ -66,6 +92,8 @@ class LineIntegrator(ABC):
 
     Parameters
     ----------
+    dt : time step [s]
+    integration : parameters of the method
     wanted : which part of the line steps need at a time, None if all of it
     """
 
@@ -74,14 +102,15 @@ class LineIntegrator(ABC):
         comm: Any,
         model: Model,
         ownership: Ownership,
-        position_factor: float,
-        velocity_factor: float,
+        dt: float,
+        integration: Integration,
         wanted: WantedPieces | None = None,
     ) -> None:
         self._comm = comm
         self.ownership = ownership
-        self.position_factor = position_factor
-        self.velocity_factor = velocity_factor
+        beta, gamma, mass_weight, force_weight = integration
+        ratio = (1.0 - force_weight) / (1.0 - mass_weight)
+        self.position_factor, self.velocity_factor = ratio * beta * dt**2, ratio * gamma * dt
         coefficients = (1.0, self.position_factor, self.velocity_factor)
         bands = OperatorBands(model, coefficients)
         self.windows = Windows(model.numbering, reach(model, bands))
@@ -107,6 +136,23 @@ class LineIntegrator(ABC):
             self._alpha_share = alpha - self._beta_share * stiffness_share
             self._shares = 1.0 + self.velocity_factor * beta_damping, stiffness_share
         n = ownership.n_local
+        # The p of each step, none by Newmark's method.
+        has_known = mass_weight != 0.0 or force_weight != 0.0
+        self._known = aligned_arrays.zeros(n if has_known else 0, 4)
+        self._steps = native.StepFactors(
+            dt=dt,
+            ratio=ratio,
+            known_of_balanced=force_weight / (1.0 - mass_weight),
+            known_of_own=-mass_weight / (1.0 - mass_weight),
+            position_of_own=dt**2 * (0.5 - beta),
+            position_of_known=dt**2 * beta,
+            velocity_of_own=dt * (1.0 - gamma),
+            velocity_of_known=dt * gamma,
+            work_velocity=self._alpha_share,
+            position_factor=self.position_factor,
+            velocity_factor=self.velocity_factor,
+            damping_share=self._beta_share,
+        )
         gains = self.position_factor, self.velocity_factor, 1.0
         self.passes: StationPasses | None = None
         self.loads: LineLoads | None = None
@@ -162,9 +208,19 @@ class LineIntegrator(ABC):
         if self.loads is not None:
             self.loads.read(motion)
 
-    @abstractmethod
     def _ahead(self) -> PredictedLineState | None:
         """A motion to keep ahead, in the arrays of this one; None if the method cannot."""
+        operators, (shown, rate, acceleration) = self.operators, self.motion.read[:3]
+        if not self._known.size:
+            # Products with C, if there are any, read the velocity.
+            velocity = rate if self._proportional else operators.rate
+            ahead = operators.factor, velocity, acceleration, shown
+            return PredictedLineState(*ahead, self._steps)
+        total = aligned_arrays.zeros(shown.size, 5)
+        predicted = rate[:0] if self._proportional else operators.rate
+        arrays = operators.factor, rate, total, self._known, shown, predicted
+        motion = AlphaAhead(*arrays, self._steps)
+        return None if abs(motion.balance[0]) < _LEAST_SHARE * self._steps.dt**2 else motion
 
     @property
     def displacement(self) -> np.ndarray:
@@ -182,19 +238,27 @@ class LineIntegrator(ABC):
         itself."""
         return self.motion.acceleration
 
-    @abstractmethod
     def predict(self) -> None:
         """Turn displacement and velocity into their values at the end of the step without the
         step's unknown acceleration, and ``operators.factor`` into -(d + ``_alpha_share`` v). Not
         collective."""
+        self._predict()
+
+    @cached_property
+    def _predict(self) -> Callable[[], None]:
+        motion = self.displacement, self.velocity, self.acceleration
+        return native.predict.bound(*motion, self._known, self.operators.factor, self._steps)
 
     def start(
         self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
     ) -> None:
         """Start from displacement [m], [rad] and velocity [m/s], [rad/s], (n_local,) each.
 
-        ``acceleration`` (n_local,) [m/s2], [rad/s2] balances the forces of this state.
+        ``acceleration`` (n_local,) [m/s2], [rad/s2] balances the forces of this state; that of the
+        generalized-alpha method itself starts with the same values.
         """
+        if self._known.size:
+            self._known[:] = (1.0 - self._steps.ratio) * acceleration
         self.motion.put(displacement, velocity, acceleration)
         if self.window is not None:
             self.window.wake()
@@ -205,11 +269,15 @@ class LineIntegrator(ABC):
 
     def _parts_of_state(self) -> Mapping[str, Callable[[], np.ndarray]]:
         """Functions that give each array of ``state``."""
-        return {name: partial(getattr, self, name) for name in MOTION}
+        parts: dict[str, Callable[[], np.ndarray]]
+        parts = {name: partial(getattr, self, name) for name in MOTION}
+        if self._known.size:
+            parts["known_acceleration"] = partial(np.asarray, self._known)
+        return parts
 
     def kept(self) -> tuple[np.ndarray, ...]:
         """The arrays themselves that a step changes: copies of them, written back, undo steps."""
-        return self.motion.read[:3]
+        return (*self.motion.read[:3], self._known)
 
     def exact_state(self) -> Mapping[str, Callable[[], np.ndarray]]:
         """Functions that return each array of ``state`` and of the kept predictions, by name.
@@ -222,6 +290,8 @@ class LineIntegrator(ABC):
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue from what ``state`` or ``exact_state`` gave, here or elsewhere, as arrays."""
+        if self._known.size:
+            self._known[:] = state["known_acceleration"]
         self.motion.take(state)
         if self.window is not None:
             self.window.wake()
@@ -455,3 +525,44 @@ class StationPasses:
             answer=answer,
             motion=motion,
         )
+
+
+def make_line(
+    comm: Any,
+    model: Model,
+    ownership: Ownership,
+    numerics: Numerics,
+    only_free: bool = True,
+    wanted: WantedPieces | None = None,
+) -> LineIntegrator:
+    """The line with the method that the numerics ask for. Collective.
+
+    Parameters
+    ----------
+    comm : mpi4py communicator
+        Communicator of the ranks.
+    model : Model
+        Discrete line.
+    ownership : Ownership
+        Which unknowns this rank owns.
+    numerics : Numerics
+        Time step and integrator of the run.
+    only_free : bool, optional
+        Whether all steps are free ones, not taken in parts.
+    wanted : WantedPieces, optional
+        Part of the line that steps need at a time, None if all of it.
+    """
+    weights = numerics.spectral_radius, numerics.beta, numerics.gamma
+    chosen = integration_of(numerics.integrator, *weights)
+    line = LineIntegrator(comm, model, ownership, numerics.dt, chosen, wanted)
+    if only_free:
+        line.keep_ahead()
+    reason = slow_method(numerics)
+    if reason and numerics.scheme == "one_solve":
+        line.slow_path = SlowPath(reason, PARTS)
+    reason = slow_load(model)
+    if reason and line.slow_path is None:
+        line.slow_path = SlowPath(reason, CALLED)
+    if line.slow_path is not None and comm.rank == 0:
+        warn_of_slow_path(line.slow_path)
+    return line

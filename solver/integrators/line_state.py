@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from catenary.solver.kernels import native
-from catenary.solver.kernels.native import Alpha, Motion, Newmark
+from catenary.solver.kernels.native import Motion, StepFactors
 
 
 class LineState:
@@ -100,14 +100,15 @@ class PredictedLineState(LineState):
         velocity: np.ndarray,
         acceleration: np.ndarray,
         shown: np.ndarray,
-        steps: Newmark,
+        steps: StepFactors,
     ) -> None:
-        dt, c_position, c_velocity, c_work, position_factor, velocity_factor, _ = steps
-        by_velocity = velocity_factor + c_velocity
-        by_position = position_factor + dt * velocity_factor + c_position + c_work * by_velocity
-        shares = -1.0, -(c_work + dt), dt * c_velocity - c_position, 1.0, -c_velocity
-        gains = -by_position, by_velocity, 1.0
-        super().__init__(ahead, velocity, acceleration, gains, shares)
+        of_position, of_velocity = steps.position_of_own, steps.velocity_of_own
+        by_velocity = steps.velocity_factor + of_velocity
+        by_position = steps.position_factor + steps.dt * steps.velocity_factor + of_position
+        by_position += steps.work_velocity * by_velocity
+        way = steps.dt + steps.work_velocity
+        shares = -1.0, -way, steps.dt * of_velocity - of_position, 1.0, -of_velocity
+        super().__init__(ahead, velocity, acceleration, (-by_position, by_velocity, 1.0), shares)
         self._steps, self._shown = steps, shown
 
     def changes(self, by_mass: float) -> native.Changes:
@@ -138,10 +139,10 @@ class PredictedLineState(LineState):
         self, displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x, y and z of displacement, velocity and acceleration, (n_local,) each."""
-        dt, c_position, c_velocity, c_work = self._steps[:4]
-        predicted = displacement + dt * velocity + c_position * acceleration
-        y = velocity + c_velocity * acceleration
-        return -(predicted + c_work * y), y, acceleration
+        steps = self._steps
+        predicted = displacement + steps.dt * velocity + steps.position_of_own * acceleration
+        y = velocity + steps.velocity_of_own * acceleration
+        return -(predicted + steps.work_velocity * y), y, acceleration
 
     def carried(self) -> Mapping[str, np.ndarray]:
         return {"ahead": self.read[0], "velocity_ahead": self.read[1]}
@@ -167,9 +168,7 @@ class AlphaAhead(PredictedLineState):
     shown : array (n_local,) that reading ``displacement`` fills
     predicted : array (n_local,) for v* of the coming step, which a product with C reads; empty
         without such a product. The step fills it at its beginning, from y, z and p
-    by : factors of the coming steps, all alike
-    factors : of the step's b in displacement [s2] and velocity [s]
-    damping_share : part of damping on mass that b lacks [1/s]
+    steps : factors of the coming steps, all alike
 
     Attributes
     ----------
@@ -184,24 +183,22 @@ class AlphaAhead(PredictedLineState):
         known: np.ndarray,
         shown: np.ndarray,
         predicted: np.ndarray,
-        by: Alpha,
-        factors: tuple[float, float],
-        damping_share: float,
+        steps: StepFactors,
     ) -> None:
         # Effect of b and p before a step on p in it, and on displacement and velocity at its end.
-        self._by_known = by.known_of_balanced + by.known_of_own * by.ratio, by.known_of_own
-        shares = tuple(zip((by.ratio, 1.0), self._by_known, strict=True))
-        position = [by.position_of_own * a + by.position_of_known * p for a, p in shares]
-        speed = [by.velocity_of_own * a + by.velocity_of_known * p for a, p in shares]
-        work = by.damping_on_stiffness
+        own = steps.known_of_own
+        self._by_known = steps.known_of_balanced + own * steps.ratio, own
+        shares = tuple(zip((steps.ratio, 1.0), self._by_known, strict=True))
+        position = [steps.position_of_own * a + steps.position_of_known * p for a, p in shares]
+        speed = [steps.velocity_of_own * a + steps.velocity_of_known * p for a, p in shares]
+        work = steps.work_velocity
         self.balance = position[0] + work * speed[0], position[1] + work * speed[1]
-        self._by_velocity, self._dt, self._damping_share = speed, by.dt, damping_share
-        self._way = by.dt + work
-        by_position = factors[0] + self._way * factors[1] + self.balance[0]
-        gains = -by_position, factors[1], self.balance[0]
+        self._by_velocity, self._way = speed, steps.dt + work
+        by_position = steps.position_factor + self._way * steps.velocity_factor + self.balance[0]
+        gains = -by_position, steps.velocity_factor, self.balance[0]
         arrays = ahead, velocity, balance
         LineState.__init__(self, *arrays, gains, (-1.0, -self._way, -1.0, 1.0, 0.0))
-        self._shown, self.known, self.predicted = shown, known, predicted
+        self._steps, self._shown, self.known, self.predicted = steps, shown, known, predicted
 
     def changes(self, by_mass: float) -> native.Changes:
         of_balanced, of_known = self.balance
@@ -212,11 +209,11 @@ class AlphaAhead(PredictedLineState):
             return of_b / of_balanced, of_p - of_b * of_known / of_balanced
 
         return native.Changes(
-            self._dt,
+            self._steps.dt,
             # z of the end of the step stands for its part of the coming prediction.
             by_position + of_balanced,
             by_velocity,
-            self._damping_share,
+            self._steps.damping_share,
             known=from_kept(*self._by_known),
             velocity=from_kept(*self._by_velocity),
             balance=self.balance,

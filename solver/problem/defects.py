@@ -8,7 +8,7 @@ spectrum of contact wires with its constants is known to us, so that all of them
 
 Defects are there once droppers are cut; these keep the lengths to which they were cut for the sound
 line. Incidents happen on the way: `after_incidents` changes the line, and `march` decides when.
-What may happen to a pantograph stands with its placement (`mbs.lowering`).
+What may happen to a pantograph stands with its placement (`mbs.head.stepping`).
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ from catenary.solver.problem.wind import Wind
 if TYPE_CHECKING:
     from catenary.mbs.build import PantographData
     from catenary.mbs.head.laws import Regulator
-    from catenary.mbs.lowering import Lowering
+    from catenary.mbs.head.stepping import Lowering
 
 OFF, EXACT, BOUNDED = "off", "exact", "bounded"
 # Of motions in an exact window, in terms of the largest one: below that they are round-off.

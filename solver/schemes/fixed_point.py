@@ -11,8 +11,7 @@ from catenary.base.errors import NotConverged
 from catenary.base.mpi import MPI
 from catenary.base.parallel import on_root
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.pantographs import Pantographs
-from catenary.solver.contact.responses import Heads
+from catenary.solver.contact.pantographs import Heads, Pantographs
 from catenary.solver.contact_problem.coupling import DIVERGED
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels.native import NOWHERE

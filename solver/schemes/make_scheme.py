@@ -19,8 +19,7 @@ from catenary.solver.contact.forces_on_line import (
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.contact_problem.coupling import make_coupling
 from catenary.solver.contact_problem.law_tangents import law_in_steps
-from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import LineIntegrator, make_line
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.switching_links import switching_links

@@ -15,10 +15,14 @@ from catenary.base.errors import RunBroken
 from catenary.base.parallel import on_root
 from catenary.base.petsc import EVENTS, event
 from catenary.solver.contact.forces_on_line import ForcesOnLine
-from catenary.solver.contact.pantographs import Pantographs
-from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact.pantographs import Heads, Pantographs
 from catenary.solver.contact_problem.coupling import NOT_FINITE, Coupling, InnerSolution
-from catenary.solver.contact_problem.force_exchange import Exchange, Reply, Verdict
+from catenary.solver.contact_problem.force_exchange import (
+    Exchange,
+    LineResponse,
+    Reply,
+    Verdict,
+)
 from catenary.solver.kernels import native
 
 # First guesses of what reserves elsewhere may lose [N] and of contact forces [N]; both grow when a
@@ -147,7 +151,7 @@ class OneSolve(Scheme):
             np.full(1, _FIRST_MARGIN if switches else _NO_MARGIN),
         )
         self._exchange = Exchange(self.comm, n, self.coupling.extrapolates, self._bounds)
-        self._respond = self.interaction.responder(self._exchange.share)
+        self._respond = self.interaction.responder(self._exchange.share.share)
         self._none = np.zeros(n)
         self._found: InnerSolution | None = None
         self._why: RunBroken | None = None
@@ -226,7 +230,7 @@ class OneSolve(Scheme):
         early = self.share.early_height, self.share.early_rate
         self._exchange.enlarge(n_links)
         self.share.early_height[:], self.share.early_rate[:] = early
-        self._respond = self.interaction.responder(self.share)
+        self._respond = self.interaction.responder(self.share.share)
 
     @property
     def traffic(self) -> tuple[int, int]:

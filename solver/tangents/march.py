@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from catenary.base.errors import RunBroken
-from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.head.pantograph import SteppedHead
 from catenary.solver.contact.pantographs import Pantographs
 from catenary.solver.kernels import native
 from catenary.solver.kernels.flush_to_zero import flushed

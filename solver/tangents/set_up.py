@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from catenary.base.errors import InputError
-from catenary.mbs.head.newmark_head import SteppedHead
+from catenary.mbs.head.pantograph import SteppedHead
 from catenary.mbs.interface import N_DRIVE, drive_width, drives_by_name
 from catenary.mbs.lumped import LumpedPantograph
 from catenary.solver.contact.contact_wire import ContactWires
@@ -288,18 +289,11 @@ def differentiate(set_up: Callable[[float], SetUp], now: SetUp, step: float, wha
     terms: list[MatrixTerm] = []
     if any(side.matrices is not now.matrices for side in sides):
         terms = _matrices(below.matrices, above.matrices, now.matrices, step)
-    return Change(
-        matrices=terms,
-        rest=or_none(of(lambda one: one.rest)),
-        links=or_none(of(lambda one: one.links)),
-        weights=or_none(of(lambda one: one.weights)),
-        heads=heads,
-        drives=or_one(drives),
-        law=or_none(of(lambda one: one.law)),
-        hertz=or_none(of(lambda one: one.hertz)),
-        start=start,
-        speed=speed,
-    )
+    parts = {
+        name: or_none(of(attrgetter(name))) for name in ("rest", "links", "weights", "law", "hertz")
+    }
+    drives = or_one(drives)
+    return Change(terms, heads=heads, drives=drives, start=start, speed=speed, **parts)
 
 
 def derivative(below: np.ndarray, above: np.ndarray, step: float) -> np.ndarray:
@@ -383,7 +377,7 @@ def _term(matrix: sparse.csr_matrix, by: Sequence[float]) -> MatrixTerm:
 
 
 def _stepped(model: Any) -> SteppedHead:
-    if isinstance(model, SteppedHead) and not model.is_regulated:
+    if isinstance(model, SteppedHead) and not (model.is_regulated or model.is_lowered):
         return model
     raise InputError(
         "a pantograph has all its bodies in the time loop, is lowered, or its lift is regulated: "

@@ -16,7 +16,6 @@ from catenary.mbs.interface import affine, drive_width
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.kernels import native
 from catenary.solver.schemes.scheme import OneSolve, Scheme
-from catenary.solver.time_loop.views.observer_list import ObserverList
 from catenary.solver.time_loop.views.observers import StepView
 from catenary.solver.time_loop.views.step_views import Showing
 from catenary.solver.window.moving_columns import MovedStations
@@ -152,16 +151,17 @@ class CompiledSteps:
         self.rows[at] = self._showing.view(self._first + self._done, time, followed=True).row
         return not self._keep_motion(int(self._kept.motion_of[at]))
 
-    def show_to(
-        self, observer_list: ObserverList, step: int, kept: Sequence[int], *, broke: bool
-    ) -> None:
-        """Show observers the steps of the latest block, the first of which follows number ``step``.
+    def shown(
+        self, step: int, kept: Sequence[int], *, broke: bool
+    ) -> tuple[np.ndarray, np.ndarray, Iterator[StepView]]:
+        """Times, rows and views of the steps of the latest block, the first of which follows number
+        ``step``, for observers.
 
         ``kept`` are the indices of the steps whose motion was kept, as passed to ``take``. A block
         that ``broke`` has left its state amid a step.
         """
         times, rows = self.times[self._block], self.rows[self._block]
-        observer_list.show_block(step, times, rows, self._views(step, times, rows, kept, broke))
+        return times, rows, self._views(step, times, rows, kept, broke)
 
     def _views(
         self, step: int, times: np.ndarray, rows: np.ndarray, kept: Sequence[int], broke: bool
@@ -187,11 +187,7 @@ class CompiledSteps:
         if number < 0:
             return True
         shown = self._showing.shown
-        if not native.keep(kept, number, shown.motion, shown.columns):
-            return False
-        # Heads that kernels call have not told them where they are now.
-        kept.kept_places[number] = np.concatenate(self.scheme.pantographs.places())
-        return True
+        return bool(native.keep(kept, number, shown.motion, shown.columns))
 
     def _take_on(self, end: int) -> tuple[bool, bool]:
         """Go on up to before index ``end`` as far as kernels can; whether the scheme has to finish

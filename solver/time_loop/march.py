@@ -48,8 +48,7 @@ from catenary.solver.statics.after_incidents import (
 )
 from catenary.solver.statics.elasticity import Elasticity
 from catenary.solver.time_loop.compiled_steps import compiled_steps
-from catenary.solver.time_loop.ts_stepper import Stepper, ts_of
-from catenary.solver.time_loop.views.observer_list import ObserverList
+from catenary.solver.time_loop.ts_stepper import ObserverList, Stepper, ts_of
 from catenary.solver.time_loop.views.observers import Observer
 from catenary.solver.time_loop.views.step_views import Showing
 from catenary.solver.window.moving_columns import MovingColumns

@@ -13,9 +13,8 @@ import numpy as np
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.files import appears_whole
 from catenary.base.options import option
-from catenary.mbs.head.newmark_head import SteppedHead
-from catenary.mbs.interface import N_DRIVE, Pantograph, drive_width
-from catenary.mbs.lowering import LoweredPantograph
+from catenary.mbs.head.pantograph import Pantograph, SteppedHead
+from catenary.mbs.interface import N_DRIVE, drive_width
 from catenary.solver.contact_problem.coupling import Implicit
 from catenary.solver.kernels import native
 from catenary.solver.model.beam import MOST_ROTATION
@@ -110,12 +109,11 @@ def stepped_by_kernels(model: Pantograph) -> SteppedHead:
     InputError
         If they call Python for it.
     """
-    moved = model.model if isinstance(model, LoweredPantograph) else model
-    if not isinstance(moved, SteppedHead):
+    if not isinstance(model, SteppedHead):
         raise InputError(
             "a pantograph has all its bodies in the time loop, which Python steps: take "
             'pantographs.*.motion = "reduced"'
         )
-    if moved.by_hand:
+    if model.by_hand:
         raise InputError("a pantograph has a controller in Python")
-    return moved
+    return model

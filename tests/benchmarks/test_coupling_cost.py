@@ -7,7 +7,7 @@ from measuring import History, start_march
 from scipy import signal
 from small_lines import EN_PANTOGRAPH, WHOLE, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Problem

@@ -14,7 +14,7 @@ import pytest
 from mpi4py import MPI
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import make_line
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.form_finding import find_form
 

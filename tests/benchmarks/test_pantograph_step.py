@@ -18,7 +18,7 @@ from scenes import load_scene, mesh_of, problem_of
 from catenary.mbs.build import Operation, PantographData, make_pantograph
 from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.vehicle import BaseMotion, Irregularity, VehicleMotion
 from catenary.solver.statics.elasticity import elasticity, middle_span
 from catenary.solver.statics.form_finding import find_form

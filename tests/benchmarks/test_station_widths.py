@@ -18,7 +18,7 @@ from repeating_line import layout, line, station_factors, station_product
 from scenes import load_scene, mesh_of, problem_of
 
 from catenary.solver.integrators.line_integrator import StationPasses
-from catenary.solver.integrators.line_state import Newmark, PredictedLineState
+from catenary.solver.integrators.line_state import PredictedLineState, StepFactors
 from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.kernels import aligned_arrays
 from catenary.solver.linear.step_operators import ByStations
@@ -26,7 +26,7 @@ from catenary.solver.model.partition import distribute
 from catenary.solver.statics.form_finding import find_form
 
 N_STATIONS, PERIOD = 1126, 45
-STEPS = Newmark(1e-3, 2.5e-7, 5e-4, 0.003, 2.5e-7, 5e-4, 0.0)
+STEPS = StepFactors(1e-3, 1.0, 0.0, 0.0, 2.5e-7, 0.0, 5e-4, 0.0, 0.003, 2.5e-7, 5e-4, 0.0)
 ROUNDS, CALLS = 300, 20
 FLOOR = "floor"
 # Planes of a station, and what a step took in terms of the floor. On a processor that fetches more

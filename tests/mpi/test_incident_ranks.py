@@ -18,7 +18,7 @@ from small_lines import bare_wires
 from studies import few
 
 from catenary.base.parallel import on_root
-from catenary.mbs.lowering import Lowering
+from catenary.mbs.head.stepping import Lowering
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import CONTACT_WIRE, LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line

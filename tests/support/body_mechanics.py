@@ -9,8 +9,7 @@ from scipy import integrate, linalg
 from scipy.interpolate import CubicSpline
 
 from catenary import InputError
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.mbs.mechanism.reduction import RaisingPantograph, ReducedMechanism
 from catenary.mbs.rigid.bodies import Body, Law, Motion, Vector, normalised, point
 from catenary.mbs.rigid.forces import BetweenPoints, BumpStop, Force, Gravity, SpringDamper
 from catenary.mbs.rigid.joints import ORIGIN, TimeLaw, unit
@@ -49,9 +48,9 @@ def generalised(force: Force, motion: Motion, time: float = 0.0) -> np.ndarray:
     """Generalised forces (6 n,) of a force alone, from the kinematics of its points."""
     if not isinstance(force, BetweenPoints):
         return force.generalised(motion, time)
-    line, (stiffness, free_length, damping, preload) = line_of(force, motion), force.linear
-    pull = stiffness * (line.length - free_length) + damping * line.rate + preload
-    pull += force.pull(line.length) if force.pull is not None else 0.0
+    line, law = line_of(force, motion), force.pull
+    pull = law.stiffness * (line.length - law.free_length) + law.damping * line.rate + law.preload
+    pull += 0.0 if law.of_length is None else law.of_length(line.length)
     return np.asarray(-pull * line.gradient)
 
 

@@ -11,8 +11,8 @@ from small_lines import BARE, EN_PANTOGRAPH, ac_simple_line, problem_of, train
 
 from catenary.mbs.air import Polynomial, Uplift
 from catenary.mbs.head.laws import Law, Regulation
+from catenary.mbs.head.stepping import Lowering
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.lowering import Lowering
 from catenary.mbs.vehicle import Harmonic, Vehicle, VehicleMotion
 from catenary.meshgen.line import DropperPlace, Fittings
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh

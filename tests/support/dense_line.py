@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.model.rest_shape import Equilibrium

@@ -9,8 +9,7 @@ from measuring import COMM
 from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
 
 from catenary.solver.effects.build_model import build
-from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import LineIntegrator, make_line
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute

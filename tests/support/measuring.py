@@ -15,8 +15,7 @@ from scipy.sparse import linalg as sparse_linalg
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.effects.all_effects import registry
 from catenary.solver.effects.effect import Effect, register, unregister
-from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import LineIntegrator, make_line
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute

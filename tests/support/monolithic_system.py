@@ -19,7 +19,7 @@ from scipy import sparse
 from catenary.mbs.air import AirForces
 from catenary.mbs.build import steady_forces
 from catenary.mbs.head.stepping import Raising
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.solver.integrators.line_loads import LineLoads
 from catenary.solver.model.beam import shape_slopes, shape_values
 from catenary.solver.model.matrices import iterate_sums

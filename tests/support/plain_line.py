@@ -16,7 +16,7 @@ from scipy import linalg, sparse
 from scipy.linalg import lapack
 from scipy.sparse import linalg as sparse_linalg
 
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.effects.all_effects import simulated

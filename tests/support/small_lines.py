@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from plain_mesh import mesh_on
 
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.line import DropperKind, Line, SteadyArm
 from catenary.meshgen.mesh import LineMesh

@@ -6,7 +6,7 @@ import numpy as np
 from measuring import History, march
 from small_lines import HANGING, en50318_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.solver.problem.problem import Problem
 
 # Moves by a nanometre: its power is the force times 1e-10 m/s times a slope below 1.

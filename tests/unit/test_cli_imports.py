@@ -120,7 +120,6 @@ OF_OTHERS = {
     "catenary.cases.run.excited_run",
     "catenary.mbs.mechanism.full_pantograph",
     "catenary.postproc.read.results",
-    "catenary.solver.integrators.generalized_alpha",
     "catenary.solver.schemes.adaptive_steps",
     "catenary.solver.schemes.fixed_point",
 }

@@ -13,7 +13,7 @@ from measuring import check
 from scenes import load_scene, problem_of, shipped
 
 from catenary.cases.scene.input.case_files import read_toml
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.response import chain_model
 
 

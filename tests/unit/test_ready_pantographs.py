@@ -12,7 +12,7 @@ from verb_runner import invoke
 
 from catenary import InputError
 from catenary.cases.scene.train.pantograph import Ready
-from catenary.mbs.lumped_data import READY, LumpedData
+from catenary.mbs.lumped import READY, LumpedData
 
 # Which case states the same pantograph.
 IN_CASES = {

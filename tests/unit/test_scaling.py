@@ -16,8 +16,7 @@ from catenary.cases.run.plan import make_plan
 from catenary.cases.scene.scene import problem_of
 from catenary.cases.studies import scaling
 from catenary.cases.studies.scaling import as_text
-from catenary.solver.contact.responses import LineResponse
-from catenary.solver.contact_problem.force_exchange import Exchange
+from catenary.solver.contact_problem.force_exchange import Exchange, LineResponse
 from catenary.solver.kernels import native
 
 WIRE = Wire(2e-6, 1e-10)

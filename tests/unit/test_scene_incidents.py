@@ -10,7 +10,7 @@ import catenary
 from catenary import InputError
 from catenary.cases.run.description import incident_facts
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.mbs.lowering import Lowering
+from catenary.mbs.head.stepping import Lowering
 from catenary.meshgen.line import DropperPlace
 from catenary.solver.problem.defects import DropperBreak, TensionLoss
 from catenary.solver.statics.line_at_rest import line_at_rest

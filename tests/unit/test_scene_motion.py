@@ -11,10 +11,10 @@ from catenary import InputError, RunBroken
 from catenary.cases.scene.checks.mesh_size import estimate_march
 from catenary.mbs.build import has_joints
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData, reduced
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 
 CASE, KIND = "ambrosio2012", "pantographs.seven_body"

@@ -21,7 +21,7 @@ from catenary.cases.scene.train.multibody import multibody_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.cases.terminal.lists import key_table
 from catenary.mbs.build import PantographData, actuator_force
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper, Table

@@ -16,10 +16,9 @@ from variable_steps import integrate
 
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.stepping import LateralPath, Stepping
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.mechanism.multibody_pantograph import stand
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.rigid.bodies import Law
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, Fixed, PrescribedPoint, Prismatic

@@ -18,8 +18,7 @@ from small_lines import WHOLE, mesh_of, numerics, train
 
 from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.kernels import native

@@ -13,12 +13,12 @@ from studies import few
 
 from catenary import RunBroken
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.contact.forces_on_line import no_links
-from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact.pantographs import Heads
 from catenary.solver.contact_problem.coupling import Coupling, make_coupling
+from catenary.solver.contact_problem.force_exchange import LineResponse
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.problem.contact_laws import HertzLaw, KinematicLaw, LinearLaw
 from catenary.solver.problem.problem import Problem

@@ -21,8 +21,7 @@ from catenary.mbs.head.strips import (
     mode_tables,
     shapes,
 )
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData, chain_matrix
+from catenary.mbs.lumped import LumpedData, LumpedPantograph, chain_matrix
 from catenary.mbs.response import head_response
 
 # A carbon strip on its aluminium holder: 1.1 m, 3 kg, EI of some hundreds.

@@ -1,6 +1,6 @@
 """HHT and the generalized-alpha method against their definition and their theory.
 
-The line steps them in a form of its own (`solver/integrators/generalized_alpha.py`), in which no
+The line steps them in a form of its own (`solver/integrators/line_integrator.py`), in which no
 force of an earlier step appears. What is compared here is the form of the textbooks,
 
     M a(1 - a_m) + C v(1 - a_f) + K d(1 - a_f) = f(1 - a_f),      x(s) = s x_new + (1 - s) x_old,
@@ -151,14 +151,16 @@ def amplification(model: Model, mode: np.ndarray, method: tuple[str, float], dt:
     """What one step of the line makes of a mode's displacement, velocity and accelerations.
 
     Matrix (4, 4); all are measured in the units that make the numbers alike: 1, 1/dt, 1/dt^2.
+    HHT that damps nothing is Newmark's method: it has one acceleration alone, the matrix is (3, 3).
     """
     weight = matrix_of(model, mass=1.0) @ mode
-    units = np.array([1.0, 1.0 / dt, 1.0 / dt**2, 1.0 / dt**2])
-    result = np.zeros((4, 4))
     with line_alone(model, settings(method, dt)) as stepper:
         names = list(stepper.state())
-        assert len(names) == 4
-        for column in range(4):
+        n = 3 if method == ("hht", 1.0) else 4
+        assert len(names) == n
+        units = np.array([1.0, 1.0 / dt, 1.0 / dt**2, 1.0 / dt**2])[:n]
+        result = np.zeros((n, n))
+        for column in range(n):
             start = {name: np.zeros(mode.size) for name in names}
             start[names[column]] = units[column] * mode
             stepper.restore(start)

@@ -18,11 +18,11 @@ from measuring import check, print_table
 from scipy.optimize import brentq
 
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.solver.contact.forces_on_line import no_links
-from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact.pantographs import Heads
 from catenary.solver.contact_problem.coupling import InnerProblem
+from catenary.solver.contact_problem.force_exchange import LineResponse
 from catenary.solver.contact_problem.law_tangents import HertzInSteps, LawInSteps
 from catenary.solver.problem.contact_laws import HYSTERESIS, HertzLaw
 

@@ -17,7 +17,7 @@ from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE, LineMesh
 from catenary.meshgen.wires import Conductor, Role
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.effect import Effect, register
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import make_line
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.partition import distribute

@@ -25,8 +25,8 @@ from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.scene import pantograph_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
-from catenary.mbs.lowering import Lowering
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.head.stepping import Lowering
+from catenary.mbs.lumped import LumpedData
 from catenary.solver.problem.problem import Damping, Problem
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"

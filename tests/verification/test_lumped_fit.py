@@ -9,7 +9,7 @@ from seven_bodies import HEAD, at_rest, calibrated, pressed
 from studies import few
 
 from catenary import InputError
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.response import BOUNDS, chain_model, fit_chain, linearise
 
 FREQUENCIES = np.geomspace(0.1, 25.0, 120)

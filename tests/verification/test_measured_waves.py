@@ -34,7 +34,7 @@ from catenary.cases.studies.waves.seen import (
 )
 from catenary.cases.studies.waves.study import Watch, excitation_of, study_excited, without_train
 from catenary.cases.studies.waves.theory import wave_theory
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest

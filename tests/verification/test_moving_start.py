@@ -7,7 +7,7 @@ import pytest
 from measuring import check, march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.solver.problem.contact_laws import ContactLaw, KinematicLaw, LinearLaw
 
 STATIC, SPEED = 150.0, 320.0 / 3.6

@@ -19,8 +19,8 @@ from catenary.cases.scene.input.case_files import read_toml
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension
-from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.lumped import LumpedData
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.response import LinearModel, apparent_mass, chain_model, head_response, linearise
 from catenary.mbs.rigid.bodies import SPACE, Body, point
 from catenary.mbs.rigid.forces import Gravity, PointForce, SpringDamper

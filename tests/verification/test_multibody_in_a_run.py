@@ -14,7 +14,7 @@ from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.scene import pantograph_of
 from catenary.cases.scene.train.pantograph import MultibodyTable
 from catenary.mbs.build import PantographData
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, reduced, stand
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"

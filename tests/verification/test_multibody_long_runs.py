@@ -16,7 +16,7 @@ from seven_bodies import HEAD, at_rest, calibrated, pressed
 
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
+from catenary.mbs.mechanism.reduction import RaisingData, RaisingPantograph
 
 pytestmark = pytest.mark.study
 

@@ -11,11 +11,14 @@ from variable_steps import integrate
 
 from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.multibody_pantograph import Head
-from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
-from catenary.mbs.mechanism.reduction import ReducedMechanism, reduce_mechanism
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.mechanism.reduction import (
+    Head,
+    RaisingData,
+    RaisingPantograph,
+    ReducedMechanism,
+    reduce_mechanism,
+)
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import calibrate_actuator, equilibrium

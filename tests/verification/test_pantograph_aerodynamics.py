@@ -13,10 +13,10 @@ from ts_alpha2 import TS_ALPHA2
 
 from catenary.mbs.air import Airflow, Polynomial, Tunnel, Uplift
 from catenary.mbs.build import Operation, make_pantograph, steady_forces
+from catenary.mbs.head.pantograph import Pantograph
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Strips, Suspension
-from catenary.mbs.interface import Pantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData, reduced, stand
 from catenary.mbs.rigid.bodies import point
 from catenary.mbs.rigid.forces import PointForce

@@ -8,8 +8,7 @@ from measuring import check, orders, print_table
 from scipy import linalg
 
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 
 EPS = np.finfo(float).eps
 # EN 50318:2002 (two masses) and the benchmark of ten codes, 2015 (three masses).

@@ -15,9 +15,8 @@ from scipy.integrate import solve_ivp
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.vehicle import BaseMotion, Harmonic, VehicleMotion
 
 MASS = 10.0

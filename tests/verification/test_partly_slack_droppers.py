@@ -25,8 +25,9 @@ from hypothesis import strategies as st
 from measuring import matrix_of
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact.pantographs import Heads
 from catenary.solver.contact_problem.coupling import InnerProblem, InnerSolution
+from catenary.solver.contact_problem.force_exchange import LineResponse
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 from catenary.solver.model.link_directions import swings_of_droppers

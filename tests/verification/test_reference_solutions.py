@@ -26,7 +26,7 @@ from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, tr
 from verb_runner import invoke
 
 from catenary.cases.studies.reference.solutions import DATA, Solution, read_solution, rms
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.topologies.line_data import ClampedWire
 from catenary.meshgen.wires import Conductor
 from catenary.postproc.evaluate.filters import low_pass

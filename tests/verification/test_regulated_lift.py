@@ -13,9 +13,8 @@ from scipy import signal
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.laws import Regulation
 from catenary.mbs.head.stepping import Stepping
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 
 # A heavy frame that lifts against a wire as stiff as a span, so that its force follows the lift.
 DATA = LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0))

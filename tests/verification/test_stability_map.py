@@ -18,7 +18,7 @@ from catenary.cases.studies.stability import coupling_schemes as theory
 from catenary.cases.studies.stability import map as map_of_stability
 from catenary.cases.studies.stability.coupling_schemes import COUPLINGS, Bench
 from catenary.cases.studies.stability.map import RESOLUTION, Grid, as_rows, draw, find, make_map
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.integrator_parameters import AVERAGE_ACCELERATION, integration_of

@@ -14,11 +14,10 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of, trai
 from catenary.mbs.build import raising_data
 from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.mechanism.multibody_pantograph import stand
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
+from catenary.mbs.mechanism.reduction import RaisingPantograph
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.rigid.statics import equilibrium

@@ -26,7 +26,7 @@ from catenary import InputError
 from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.studies.sensitivity.derivatives import change_by
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.problem import Damping, Problem

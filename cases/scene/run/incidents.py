@@ -12,7 +12,7 @@ from catenary.meshgen.line import Line
 from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
 
 if TYPE_CHECKING:
-    from catenary.mbs.lowering import Lowering
+    from catenary.mbs.head.stepping import Lowering
 
 
 # With less a wire sags by more than a hundred times as much: as much as a span is long, which is
@@ -89,7 +89,7 @@ def lowering_of(tables: Sequence[IncidentTable], number: int, dt: float) -> Lowe
     """Lowering of the pantograph ``number``, from 1; None if it is not lowered."""
     for table in tables:
         if isinstance(table, LoweringTable) and table.pantograph == number:
-            from catenary.mbs.lowering import Lowering
+            from catenary.mbs.head.stepping import Lowering
 
             return Lowering(at_step(table.at_s, dt), table.force_N, table.within_s, table.drop_m)
     return None

@@ -21,7 +21,7 @@ from catenary.cases.scene.keys.table import Table, ascending, exactly_one, given
 from catenary.cases.scene.train.head import RollTable, SomeMass, StripsTable
 from catenary.cases.scene.train.laws import AerodynamicsTable, LawTable, RegulationTable
 from catenary.cases.scene.train.mechanism import BodyTable, ForceTable, JointTable, Name
-from catenary.mbs.lumped_data import READY
+from catenary.mbs.lumped import READY
 
 Mass = Annotated[float, Field(gt=0, le=1000), SomeMass]
 Stiffness = Annotated[float, Field(ge=0, le=1e8)]

@@ -23,8 +23,8 @@ from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.postproc.record.run_watch import RunWatch
 from catenary.solver.contact.contact_wire import ContactWires
+from catenary.solver.integrators.line_integrator import make_line
 from catenary.solver.integrators.line_loads import LineLoads
-from catenary.solver.integrators.make_line import make_line
 from catenary.solver.linear.line_products import Subdomain
 from catenary.solver.model.link_directions import swings_of_droppers
 from catenary.solver.model.links import Direction

@@ -34,7 +34,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from catenary.cases.studies.hard.runs import rest_height
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model

@@ -32,7 +32,7 @@ from catenary.cases.studies.stability.coupling_schemes import (
     Bench,
 )
 from catenary.cases.terminal.runs_bar import RunsBar
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.postproc.report.pictures import figures
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute

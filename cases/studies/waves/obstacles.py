@@ -20,7 +20,7 @@ from catenary.meshgen.line import Droppers, Line, SteadyArms, Supports
 from catenary.meshgen.wires import Conductor, Piece, Profile, Section, Wire
 from catenary.postproc.report.pictures import figures
 from catenary.solver.effects.build_model import build
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import make_line
 from catenary.solver.model import beam
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Block, Model

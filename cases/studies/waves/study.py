@@ -46,7 +46,7 @@ from catenary.cases.studies.waves.theory import (
     row_of,
     wave_theory,
 )
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.slowest_wave import bends, slowest_wave_of
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.remarks import all_remarks

@@ -191,6 +191,7 @@ void Head::bend(const Bending& bending) {
 
 bool Head::step(std::span<const double> drive) {
     const DriveRow<const double> row{drive, n_strips_};
+    time_ = row.drive().time;
     if (parts_.lowering && is_held(row.drive())) return true;
     aim(drive);
     return step_free(row.drive());
@@ -287,8 +288,9 @@ void Head::advance(std::span<const double> contact_force) {
         for (int64_t j = 0; j < n_strips_; ++j) value -= contact_force[j] * by(i, j);
         arrays().state[i] = value;
     }
-    remember(contact_force);
+    if (laws_) std::ranges::copy(contact_force, parts_.sprung->laws.pressed.begin());
     if (parts_.regulation) catenary::regulate(*parts_.regulation, measured(contact_force));
+    if (after_) after_(time_, contact_force);
 }
 
 /// Measured variable of the lift regulation at the end of a step: mean height of the strips [m], or
@@ -359,10 +361,6 @@ bool Head::step_free(const Drive& drive) {
     if (!parts_.linear) return step_sprung(drive);
     step_linear(drive);
     return true;
-}
-
-void Head::remember(std::span<const double> contact_force) {
-    if (laws_) std::ranges::copy(contact_force, parts_.sprung->laws.pressed.begin());
 }
 
 void Head::step_linear(const Drive& drive) {

@@ -2,10 +2,11 @@
 // Pantographs stepped by Newmark's method: the row that drives a step, state, strips, contact. With
 // a regulated lift, filter, samples, gains, limits, delay (mbs/head/laws.py); laws that are not
 // linear, tables that settle within a step (mbs/head/laws.py); and the lowering under way until the
-// head is caught (mbs/lowering.py).
+// head is caught (mbs/head/stepping.py).
 //
 // A head has n coordinates and s strips; its state are positions, velocities and accelerations one
 // after the other (3 n,).
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -104,7 +105,7 @@ struct HeadLaws {
     CATENARY_SHAPES("m n, m, *, s")
 };
 
-/// What raises a head, see mbs/mechanism/reduced_pantograph.py; its height is a coordinate.
+/// What raises a head, see mbs/mechanism/reduction.py; its height is a coordinate.
 struct ReducedMechanism {
     /// Columns of the tables; the last one may be missing.
     enum Column { kMass, kLift, kSlowing, kCarried, kBlown, kMostColumns };
@@ -254,6 +255,9 @@ class Head {
     }
     /// Put the added force [N] of a controller that no kernel knows.
     void set_added_force(double force) { added_force_ = force; }
+    /// Have a function called at the end of each step, with its time [s] and contact forces [N].
+    using After = std::function<void(double, std::span<const double>)>;
+    void then(After after) { after_ = std::move(after); }
 
     /// Height at which a mechanism's tables were taken in the latest step [m].
     double height() const { return height_; }
@@ -283,8 +287,6 @@ class Head {
     /// Step from the state to that without contact and fill `out`; whether the head is where its
     /// model reaches. NaN passes, for the coupling to find.
     virtual bool step_free(const Drive& drive);
-    /// Remember the latest contact forces, which laws read.
-    virtual void remember(std::span<const double> contact_force);
 
   private:
     void step_linear(const Drive& drive);
@@ -316,6 +318,8 @@ class Head {
     HeadParts parts_;
     int64_t n_, n_strips_;
     double added_force_ = 0.0, height_ = 0.0;
+    double time_ = 0.0;  ///< at the end of the step [s]
+    After after_;
     std::vector<double> free_;      ///< (3 n,) the state of the coming step without contact
     std::vector<double> by_force_;  ///< (3 n, s) its decrease by a unit of each contact force
     std::vector<double> shapes_, slopes_;  ///< room for modes

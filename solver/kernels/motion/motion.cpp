@@ -31,12 +31,19 @@ bool moves(const Motion& motion, int64_t begin, int64_t end, std::span<const dou
 
 CATENARY_FOR_TARGETS
 void predict(std::span<double> displacement, std::span<double> velocity,
-             std::span<const double> acceleration, std::span<double> work, const Newmark& steps) {
-    const Newmark s = steps;
+             std::span<const double> balanced, std::span<double> known, std::span<double> work,
+             const StepFactors& factors) {
+    const StepFactors s = factors;
+    const bool has_known = !known.empty();
     for (size_t i = 0; i < displacement.size(); ++i) {
+        double a = balanced[i], p = 0.0;
+        if (has_known) {
+            a = known[i] + s.ratio * balanced[i];
+            known[i] = p = s.known_of_balanced * balanced[i] + s.known_of_own * a;
+        }
         const double d =
-            displacement[i] + s.dt * velocity[i] + s.predict_position * acceleration[i];
-        const double v = velocity[i] + s.predict_velocity * acceleration[i];
+            displacement[i] + s.dt * velocity[i] + s.position_of_own * a + s.position_of_known * p;
+        const double v = velocity[i] + s.velocity_of_own * a + s.velocity_of_known * p;
         displacement[i] = d;
         velocity[i] = v;
         work[i] = -(d + s.work_velocity * v);
@@ -54,24 +61,6 @@ void correct(std::span<double> displacement, std::span<double> velocity,
         if (writes) acceleration[i] = a;
         velocity[i] = v + velocity_factor * a;
         displacement[i] += position_factor * a;
-    }
-}
-
-CATENARY_FOR_TARGETS
-void predict_alpha(std::span<double> displacement, std::span<double> velocity,
-                   std::span<const double> balanced, std::span<double> known,
-                   std::span<double> work, const Alpha& by) {
-    const Alpha s = by;
-    for (size_t i = 0; i < displacement.size(); ++i) {
-        const double b = balanced[i], a = known[i] + s.ratio * b;
-        const double p = s.known_of_balanced * b + s.known_of_own * a;
-        const double d =
-            displacement[i] + s.dt * velocity[i] + s.position_of_own * a + s.position_of_known * p;
-        const double v = velocity[i] + s.velocity_of_own * a + s.velocity_of_known * p;
-        known[i] = p;
-        displacement[i] = d;
-        velocity[i] = v;
-        work[i] = -(d + s.damping_on_stiffness * v);
     }
 }
 

@@ -36,43 +36,31 @@ void find_peak(const Motion& motion, int64_t begin, int64_t end, std::span<doubl
 bool moves(const Motion& motion, int64_t begin, int64_t end, std::span<const double> peak,
            double share);
 
-/// Factors of a step of Newmark's method.
-struct Newmark {
-    double dt;                                  ///< [s]
-    double predict_position, predict_velocity;  ///< of the acceleration before in predictions of
-                                                ///< displacement [s2], velocity [s]
-    double work_velocity;                       ///< c of d + c v, see `Alpha`
-    double position_factor, velocity_factor;    ///< of the acceleration after the step [s2], [s]
+/// Factors of a step of Newmark's or the generalized-alpha method. With b the acceleration that
+/// balances the forces at the end of a step, the algorithm's is a = p + r b, where p is known when
+/// the step begins: none by Newmark's method.
+struct StepFactors {
+    double dt, ratio;                           ///< [s], r
+    double known_of_balanced, known_of_own;     ///< shares of b and a before in p
+    double position_of_own, position_of_known;  ///< of a before and p in the displacement [s2]
+    double velocity_of_own, velocity_of_known;  ///< and in the velocity [s]
+    double work_velocity;  ///< c, so that K (d + c v) has the forces of damping on K, too
+    double position_factor, velocity_factor;  ///< of b in displacement [s2] and velocity [s]
     double damping_share;  ///< of damping on mass that the acceleration lacks [1/s]
-    CATENARY_RECORD(dt, predict_position, predict_velocity, work_velocity, position_factor,
+    CATENARY_RECORD(dt, ratio, known_of_balanced, known_of_own, position_of_own, position_of_known,
+                    velocity_of_own, velocity_of_known, work_velocity, position_factor,
                     velocity_factor, damping_share)
 };
-/// Predictions in place (eq. 2.5); `work` becomes -(d + `work_velocity` v).
+/// Predictions in place (eq. 2.5) from b and p of the step before. `known` becomes the p of this
+/// step, if it is not empty, and `work` -(d + c v).
 void predict(std::span<double> displacement, std::span<double> velocity,
-             std::span<const double> acceleration, std::span<double> work, const Newmark& steps);
+             std::span<const double> balanced, std::span<double> known, std::span<double> work,
+             const StepFactors& factors);
 /// New displacement and velocity from predictions and acceleration (eq. 2.6). The acceleration
 /// still lacks -`damping_share` v, the part of damping on mass.
 void correct(std::span<double> displacement, std::span<double> velocity,
              std::span<double> acceleration, double position_factor, double velocity_factor,
              double damping_share);
-
-/// Factors of a step's predictions by the accelerations of the generalized-alpha method. With b the
-/// acceleration that balances the forces at the end of a step, the algorithm's is a = p + r b,
-/// where p is known when the step begins.
-struct Alpha {
-    double dt, ratio;                           ///< [s], r
-    double known_of_balanced, known_of_own;     ///< shares of b and a before in p
-    double position_of_own, position_of_known;  ///< of a before and p in the displacement [s2]
-    double velocity_of_own, velocity_of_known;  ///< and in the velocity [s]
-    double damping_on_stiffness;  ///< c, so that K (d + c v) has the forces of damping on K, too
-    CATENARY_RECORD(dt, ratio, known_of_balanced, known_of_own, position_of_own, position_of_known,
-                    velocity_of_own, velocity_of_known, damping_on_stiffness)
-};
-/// Predictions in place from b and p of the step before. `known` becomes the p of this step, and
-/// `work` -(d + c v).
-void predict_alpha(std::span<double> displacement, std::span<double> velocity,
-                   std::span<const double> balanced, std::span<double> known,
-                   std::span<double> work, const Alpha& by);
 
 /// Fill in displacements, velocities, of the unknowns from `begin` on.
 void displacements(const Motion& motion, int64_t begin, std::span<double> result);

@@ -10,21 +10,24 @@ namespace {
 /// A head whose steps are calls of Python, with no coordinates of its own.
 class CalledHead : public Head {
   public:
-    CalledHead(const HeadArrays& arrays, py::object predict, py::object advance)
-        : Head(arrays), predict_(std::move(predict)), advance_(std::move(advance)) {}
+    CalledHead(const HeadArrays& arrays, py::object predict)
+        : Head(arrays), predict_(std::move(predict)) {}
 
   protected:
     bool step_free(const Drive& drive) override {
         predict_(drive.time);
         return true;
     }
-    void remember(std::span<const double> force) override {
-        advance_(py::array_t<double>(static_cast<py::ssize_t>(force.size()), force.data()));
-    }
 
   private:
-    py::object predict_, advance_;
+    py::object predict_;
 };
+
+void then(Head& head, py::object after) {
+    head.then([after = std::move(after)](double time, std::span<const double> force) {
+        after(time, py::array_t<double>(static_cast<py::ssize_t>(force.size()), force.data()));
+    });
+}
 
 std::span<const double> row(const Head& head, const py::object& drive) {
     return numbers<const double>(drive, "drive", kDrive + 2 * head.n_strips());
@@ -60,6 +63,7 @@ void offer_heads(py::module_& module) {
         .def_property("first", &Head::first, &Head::set_first)
         .def_property("added_force", &Head::added_force, &Head::set_added_force)
         .def("bend", taking(&Head::bend, "bending"))
+        .def("then", &then)
         .def("lower", taking(&Head::lower, "lowering"))
         .def("regulate", taking(&Head::regulate, "regulation"))
         .def("step",
@@ -71,8 +75,7 @@ void offer_heads(py::module_& module) {
              })
         .def("extrapolate", &extrapolate);
     py::class_<CalledHead, Head>(module, "CalledHead")
-        .def(made_of<CalledHead, HeadArrays, py::object, py::object>("arrays", "predict",
-                                                                     "advance"));
+        .def(made_of<CalledHead, HeadArrays, py::object>("arrays", "predict"));
 
     CATENARY_OFFER_TYPE(module, "BODY_PRODUCT", BodyProduct, body, start, end, between, normal,
                         at_start, at_end);

@@ -27,13 +27,12 @@ void offer_base(py::module_& module) {
 }
 
 void offer_line(py::module_& module) {
-    offer_records<Motion, Newmark, Alpha, Columns, Shown, Window, Changing, Sampled, Loads,
+    offer_records<Motion, StepFactors, Columns, Shown, Window, Changing, Sampled, Loads,
                   MemoryTables, Memories, Links, Dependents>(module);
     CATENARY_OFFER_TYPE(module, "RESERVE", Reserve, rest, stiffness, damping, place, released,
                         carried);
-    offer(module, "predict", predict, "n, n, n, n");
+    offer(module, "predict", predict, "n, n, n, n?, n");
     offer(module, "correct", correct, "n, n, n");
-    offer(module, "predict_alpha", predict_alpha, "n, n, n, n, n");
     offer(module, "displacements", displacements, "");
     offer(module, "velocities", velocities, "");
     offer(module, "reserves", reserves, "*, n=n, n");

@@ -125,7 +125,6 @@ class Checkpoints:
         self._scheme.restore(checkpoint["contacts"])
         for i, pantograph in enumerate(pantographs.models):
             pantograph.restore(checkpoint[f"pantograph_{i}"])
-        pantographs.measure_joints()
 
     def _states_of_line(self, checkpoint: dict[str, Any]) -> dict[str, np.ndarray]:
         """The rank's part of the line's motion, by name, each (n_local,)."""

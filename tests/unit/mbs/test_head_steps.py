@@ -13,11 +13,8 @@ from catenary import RunBroken
 from catenary.mbs.head.laws import Law
 from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
-from catenary.mbs.mechanism.multibody_pantograph import Head
-from catenary.mbs.mechanism.reduced_pantograph import RaisingData, RaisingPantograph
-from catenary.mbs.mechanism.reduction import ReducedMechanism
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
+from catenary.mbs.mechanism.reduction import Head, RaisingData, RaisingPantograph, ReducedMechanism
 from catenary.mbs.vehicle import BaseMotion, Harmonic, VehicleMotion
 
 EPS = np.finfo(float).eps

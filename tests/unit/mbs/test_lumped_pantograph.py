@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import drive_width, drives_by_name
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 
 DT = 1e-3
 EPS = np.finfo(float).eps

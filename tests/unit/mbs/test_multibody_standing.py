@@ -15,8 +15,7 @@ from catenary.mbs.air import Airflow
 from catenary.mbs.build import Operation, make_pantograph, raising_data
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, describe, reduced, stand
-from catenary.mbs.mechanism.reduced_pantograph import RaisingPantograph
-from catenary.mbs.mechanism.reduction import Raised, reduce_mechanism
+from catenary.mbs.mechanism.reduction import Raised, RaisingPantograph, reduce_mechanism
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper
 from catenary.mbs.rigid.joints import Prismatic, Revolute

@@ -7,11 +7,10 @@ import gc
 import numpy as np
 import pytest
 
-from catenary.mbs.head.newmark_head import head_of
+from catenary.mbs.head.pantograph import head_of
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import drive_width, drives_by_name
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData, LumpedPantograph
 from catenary.solver.kernels import native
 
 DT = 1e-3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from paper_pantograph import data as seven_bodies
 
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import stand
 from catenary.mbs.shape import (
     BELOW_HEAD,

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from catenary.cases.run.description import description_of
-from catenary.mbs.head.stepping import Stepping
+from catenary.mbs.head.stepping import Lowering, Stepping
 from catenary.mbs.interface import drive_width
-from catenary.mbs.lowering import Lowering
-from catenary.mbs.lumped import LumpedPantograph
-from catenary.mbs.lumped_data import READY, LumpedData
+from catenary.mbs.lumped import READY, LumpedData, LumpedPantograph
 
 TIED = LumpedData((10.31, 6.15, 15.30), (53415.8, 6754.2, 40687.0), (29.6, 0.2, 1.14))
 FORCE, NOMINAL, PLACED, RAISE, DT = 110.0, 5.0, 4.99, 0.5, 1e-3

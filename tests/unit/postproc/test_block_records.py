@@ -13,7 +13,7 @@ from catenary.postproc.files.header import GZIP, LineRecord
 from catenary.postproc.record.progress import Progress
 from catenary.postproc.record.recorder import Recorder
 from catenary.postproc.record.snapshots.fields import FieldRecorder
-from catenary.solver.time_loop.views.observer_list import ObserverList
+from catenary.solver.time_loop.ts_stepper import ObserverList
 from catenary.solver.time_loop.views.observers import Observer
 
 

@@ -19,7 +19,7 @@ from catenary import InputError
 from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.keys.units import unit_of
 from catenary.mbs.head.strips import Strips, Suspension
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.postproc.evaluate.error_indicators import as_table, indicate
 from catenary.postproc.evaluate.statistics import evaluate

@@ -23,7 +23,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from catenary import InputError, RunBroken
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.shape import HEAD, shape_of
 from catenary.postproc.files.hdf5 import seal_attributes, set_attribute
 from catenary.postproc.film import animate, drawing, scenery, video

@@ -16,9 +16,9 @@ from studies import few
 from catenary import RunBroken
 from catenary.mbs.air import Polynomial, Tunnel, Uplift
 from catenary.mbs.head.laws import Law, Regulation
+from catenary.mbs.head.stepping import Lowering
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.lowering import Lowering
-from catenary.mbs.lumped_data import LumpedData
+from catenary.mbs.lumped import LumpedData
 from catenary.mbs.mechanism.full_pantograph import FullPantograph
 from catenary.mbs.rigid.forces import PointForce
 from catenary.mbs.vehicle import Harmonic, Irregularity, VehicleMotion
@@ -286,18 +286,18 @@ def test_a_step_that_breaks_amid_a_block_leaves_the_rows_before_it(
     assert np.array_equal(rows.rows, expected.rows, equal_nan=True)
 
 
-@pytest.mark.parametrize("method", ["predict", "advance"])
+@pytest.mark.parametrize("method", ["_predict", "_advance"])
 def test_a_pantograph_that_breaks_in_python_ends_the_run_as_from_python(
     method: str, mesh: LineMesh, from_python: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     usual, steps = getattr(FullPantograph, method), 0
 
-    def breaks(self: FullPantograph, given: Any) -> Any:
+    def breaks(self: FullPantograph, *given: Any) -> Any:
         nonlocal steps
         steps += 1
         if steps > 50:
             raise RunBroken("a joint broke")
-        return usual(self, given)
+        return usual(self, *given)
 
     monkeypatch.setattr(FullPantograph, method, breaks)
     expected, outcome = from_python(problem("all bodies", 100), mesh)

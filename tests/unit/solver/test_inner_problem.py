@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.solver.contact.forces_on_line import no_links
-from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact.pantographs import Heads
 from catenary.solver.contact_problem import coupling
 from catenary.solver.contact_problem.coupling import InnerProblem, InnerSolution
+from catenary.solver.contact_problem.force_exchange import LineResponse
 from catenary.solver.contact_problem.law_tangents import HertzInSteps, LawInSteps
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw

@@ -10,8 +10,7 @@ import pytest
 from measuring import COMM
 from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of
 
-from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import LineIntegrator, make_line
 from catenary.solver.model.loads import Load, ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute

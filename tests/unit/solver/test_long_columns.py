@@ -8,7 +8,7 @@ from axial_lines import ALONG, elastic_line
 from measuring import COMM
 from small_lines import mesh_of, numerics, problem_of
 
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import make_line
 from catenary.solver.linear import unit_responses
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Damping

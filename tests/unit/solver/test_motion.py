@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from catenary.solver.integrators.line_state import LineState, Newmark, PredictedLineState
+from catenary.solver.integrators.line_state import LineState, PredictedLineState, StepFactors
 from catenary.solver.kernels import native
 
 RNG = np.random.default_rng(5)
 N = 12
-STEPS = Newmark(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+STEPS = StepFactors(0.1, 1.0, 0.0, 0.0, 0.002, 0.0, 0.05, 0.0, 0.3, 0.0025, 0.05, 0.4)
 # Sums of some numbers of order one.
 ROUND_OFF = 1e-15
 
@@ -29,7 +29,7 @@ def test_it_keeps_what_newmark_s_formulas_predict(state: np.ndarray) -> None:
     motion, work = ahead(), np.zeros(N)
     motion.put(*state)
     predicted = state.copy()
-    native.predict(*predicted, work, STEPS)
+    native.predict(*predicted, np.zeros(0), work, STEPS)
     x, y, z = motion.read[:3]
     for found, expected in ((x, work), (y, predicted[1]), (z, state[2])):
         np.testing.assert_allclose(found, expected, rtol=0, atol=4 * ROUND_OFF)

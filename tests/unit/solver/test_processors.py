@@ -9,11 +9,11 @@ import pytest
 from repeating_line import layout, line, station_factors, station_product
 
 from catenary.solver.integrators.line_integrator import StationPasses
-from catenary.solver.integrators.line_state import Newmark, PredictedLineState
+from catenary.solver.integrators.line_state import PredictedLineState, StepFactors
 from catenary.solver.kernels import native
 from catenary.solver.linear.step_operators import ByStations
 
-STEPS = Newmark(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+STEPS = StepFactors(0.1, 1.0, 0.0, 0.0, 0.002, 0.0, 0.05, 0.0, 0.3, 0.0025, 0.05, 0.4)
 # Numbers of order one; the order of a sum differs.
 ROUND_OFF = 1e-13
 

@@ -15,8 +15,8 @@ from repeating_line import layout, line, station_factors, station_product
 
 from catenary.mbs.interface import affine
 from catenary.solver.contact.forces_on_line import no_links
-from catenary.solver.contact.responses import LineResponse
 from catenary.solver.contact_problem.coupling import InnerProblem
+from catenary.solver.contact_problem.force_exchange import LineResponse
 from catenary.solver.contact_problem.law_tangents import LawInSteps
 from catenary.solver.kernels import native
 

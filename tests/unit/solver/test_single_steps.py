@@ -12,7 +12,7 @@ import pytest
 from measuring import start_march
 from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
 
-from catenary.mbs.lowering import Lowering
+from catenary.mbs.head.stepping import Lowering
 from catenary.meshgen.mesh import LineMesh
 from catenary.solver.integrators import slow_path
 from catenary.solver.integrators.slow_path import single_steps_of

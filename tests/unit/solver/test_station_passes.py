@@ -7,13 +7,13 @@ import pytest
 from repeating_line import layout, line, station_factors, station_product, widths_of
 
 from catenary.solver.integrators.line_integrator import StationPasses
-from catenary.solver.integrators.line_state import LineState, Newmark, PredictedLineState
+from catenary.solver.integrators.line_state import LineState, PredictedLineState, StepFactors
 from catenary.solver.kernels import native
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.switching_links import RESERVE
 
 RNG = np.random.default_rng(11)
-STEPS = Newmark(0.1, 0.002, 0.05, 0.3, 0.0025, 0.05, 0.4)
+STEPS = StepFactors(0.1, 1.0, 0.0, 0.0, 0.002, 0.0, 0.05, 0.0, 0.3, 0.0025, 0.05, 0.4)
 LAWS = np.zeros(2000, dtype=RESERVE)
 for name in ("rest", "stiffness", "damping"):
     LAWS[name] = RNG.standard_normal(LAWS.size)
@@ -52,12 +52,12 @@ def compare(
 
     read, force, solution = others.copy(), np.zeros(b * n), answer.copy()
     expected = displacement.copy(), velocity.copy(), solution[own]
-    native.predict(*expected, read[b:-b][own], STEPS)
+    native.predict(*expected, np.zeros(0), read[b:-b][own], STEPS)
     product.multiply(read, force)
     if loaded:
         force += loads
     factors.solve(force, solution)
-    native.correct(*expected, *STEPS[4:])
+    native.correct(*expected, *STEPS[9:])
 
     # Links at every third station, whose ends may be at different ones.
     upper = np.arange(0, n_own, 3)

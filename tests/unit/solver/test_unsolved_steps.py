@@ -15,8 +15,9 @@ from small_lines import WHOLE, en50318_line, mesh_of, problem_of
 from catenary import InputError, RunBroken
 from catenary.base.errors import NotConverged
 from catenary.solver.contact.forces_on_line import no_links
-from catenary.solver.contact.responses import Heads, LineResponse
+from catenary.solver.contact.pantographs import Heads
 from catenary.solver.contact_problem.coupling import Explicit, InnerProblem
+from catenary.solver.contact_problem.force_exchange import LineResponse
 from catenary.solver.contact_problem.law_tangents import HertzInSteps, KinematicInSteps, LawInSteps
 from catenary.solver.problem.contact_laws import HertzLaw
 from catenary.solver.statics.form_finding import find_form

@@ -11,8 +11,7 @@ from axial_lines import ALONG, elastic_line
 from measuring import COMM
 from small_lines import mesh_of, numerics, problem_of
 
-from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import LineIntegrator, make_line
 from catenary.solver.model.loads import ShapeLoad, table
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute

@@ -11,7 +11,7 @@ from measuring import COMM
 from small_lines import numerics
 from stitched_line import motion, stitched_model
 
-from catenary.solver.integrators.make_line import make_line
+from catenary.solver.integrators.line_integrator import make_line
 from catenary.solver.model.loads import ShapeLoad
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model

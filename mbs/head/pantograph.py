@@ -1,31 +1,201 @@
-"""Base of all pantographs that step by Newmark's method: their state, their strips, contact."""
+"""Pantographs as the coupling and kernels step them, and those that step by Newmark's method.
+
+Heights are measured like the line's, z up [m]; contact forces are >= 0 in compression and push
+the head down. A head touches the wire with s strips, mostly one; where several contact wires run
+side by side each of them may touch each strip, and what is said of strips holds for contacts, those
+of one strip together. A pantograph lives on rank 0 and is never called elsewhere.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
+from weakref import WeakMethod
 
 import numpy as np
 
 from catenary.mbs.head.laws import Controller, Law, Regulation, Regulator, in_place
-from catenary.mbs.head.stepping import Part, Raising, Stepping
+from catenary.mbs.head.stepping import Lowering, Part, Raising, Stepping
 from catenary.mbs.head.strips import HeadParts
 from catenary.mbs.interface import N_DRIVE, HeadState, drive_width, drives_by_name
+from catenary.mbs.vehicle import BaseMotion, lifted
 from catenary.solver.kernels import native
 
 # A step that takes no time: what it finds are the accelerations of the state as it is.
-_NO_TIME = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
+NO_TIME = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class SteppedHead(ABC):
-    """A head's strips on n coordinates, the head's own first, which a step advances together.
+def weakly(method: Callable[..., Any]) -> Callable[..., None]:
+    """A method for a compiled head to call: heads belong to models, and must not keep these."""
+    own = WeakMethod(method)
+
+    def call(*arguments: Any) -> None:
+        if (found := own()) is not None:
+            found(*arguments)
+
+    return call
+
+
+class Pantograph(ABC):
+    """A pantograph that advances with the global contact step, which may be lowered and caught.
 
     Attributes
     ----------
+    strip_offsets : places of the strips ahead of the pantograph's own place along the track [m]
     stepped : the compiled head, for steps from Python and in the loop of kernels
     head : HeadState, what it predicted last
     row : inputs of the coming step, see `interface.drives_by_name`
+    violation : (1,) largest error of a row of joints [m, cosine], NaN without joints in the loop
+
+    Parameters
+    ----------
+    strip_offsets : as above, (s,)
+    base : how the vehicle moves; without it the base stays
+    """
+
+    stepped: native.Head
+    # Height of the base at rest [m].
+    _foot = 0.0
+
+    def __init__(self, strip_offsets: tuple[float, ...], base: BaseMotion | None) -> None:
+        s = len(strip_offsets)
+        self.strip_offsets, self._base = strip_offsets, base
+        self.head = HeadState(s)
+        self.row = np.zeros(drive_width(s))
+        self._rows = drives_by_name(self.row[None])
+        self._lowered = np.zeros(0, dtype=native.LOWERING_MEMORY)
+        self.violation = np.full(1, np.nan)
+
+    @abstractmethod
+    def follow(self, part: Part) -> None:
+        """Scale the lift by ``part``; where it is negative, it pulls down."""
+
+    def lower(self, lowering: Lowering) -> None:
+        """Have the head caught when it has gone down; the lift follows the lowering already."""
+        self._lowered = np.zeros(1, dtype=native.LOWERING_MEMORY)
+        self.stepped.lower(native.Lowering(lowering.time, lowering.drop, self._lowered))
+
+    @property
+    def is_lowered(self) -> bool:
+        """Whether it is lowered under way."""
+        return self._lowered.size > 0
+
+    @property
+    def is_caught(self) -> bool:
+        """Whether it has been lowered and caught."""
+        return bool((self._lowered["phase"] == 2.0).any())
+
+    def place(self, head_height: float, velocity: float = 0.0) -> None:
+        """Put the pantograph without contact to where its head is at ``head_height`` [m], all of it
+        moving upward with ``velocity`` [m/s].
+
+        Raises
+        ------
+        RunBroken
+            A mechanism does not reach this height.
+        """
+        self._place(head_height, velocity)
+        self._lowered["height"] = head_height - lifted(self._base, 0.0)[0]
+
+    @abstractmethod
+    def _place(self, head_height: float, velocity: float) -> None:
+        """As ``place``."""
+
+    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Heights [m] and velocities [m/s] of the strips at ``time`` [s], the end of the coming
+        step, by Newmark's predictor (paper eq. 2.5); (s,) each, overwritten by the next call."""
+        if not self.is_caught:
+            return self._extrapolate(time)
+        place, velocity = lifted(self._base, time)
+        s = len(self.strip_offsets)
+        return np.full(s, self._lowered["caught_at"][0] + place), np.full(s, velocity)
+
+    @abstractmethod
+    def _extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """As ``extrapolate``, unless it is caught."""
+
+    def predict(self, time: float) -> HeadState:
+        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step,
+        which do not move what is caught; overwritten by the next call.
+
+        Raises
+        ------
+        RunBroken
+            A mechanism has left the heights that it can reach, or its joints cannot be closed.
+        """
+        self._drive(time)
+        if not self.stepped.step(self.row):
+            self._refuse(self.stepped, time)
+        return self.head
+
+    def _drive(self, time: float) -> None:
+        """Fill in the row of a step to ``time`` [s]."""
+        self._put_drives(np.array([time]), self._rows)
+
+    def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
+        """Put into ``rows`` (n,) what steps to ``times`` (n,) [s] depend on besides the state and
+        wires."""
+        rows["time"] = times
+        lifts = None if self._base is None else self._base.lifts(times)
+        if lifts is not None:
+            rows["roof"], rows["roof_velocity"] = lifts[:2]
+        self._put_inputs(times, rows, lifts)
+
+    def _put_inputs(  # noqa: B027  (a mechanism with all bodies reads its own)
+        self, times: np.ndarray, rows: np.ndarray, lifts: np.ndarray | None
+    ) -> None:
+        """Put in the rest; ``lifts`` (3, n) is the motion of a base that moves."""
+
+    def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
+        """Fill in what steps to ``times`` [s] depend on besides the state, a row each.
+
+        ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with.
+        """
+        self._put_drives(times, drives_by_name(drives))
+
+    def _refuse(self, left: native.Head, time: float) -> None:  # noqa: B027  (chains are endless)
+        """Raise RunBroken for a head that has left its heights in a step to ``time`` [s]."""
+
+    def advance(self, contact_force: np.ndarray) -> None:
+        """Take the step predicted last with the contact forces ``contact_force`` (s,) [N]."""
+        self.stepped.advance(np.ascontiguousarray(contact_force, dtype=float))
+
+    def state(self) -> np.ndarray:
+        """State to continue from, as one array: the model's own; behind it, of one that is lowered,
+        its height, where it is caught, and 0 before the lowering, 1 during it, 2 once caught."""
+        return np.concatenate([*self._own_state(), self._lowered.view(float)])
+
+    @abstractmethod
+    def _own_state(self) -> list[np.ndarray]:
+        """Parts of the model's own state."""
+
+    def restore(self, state: np.ndarray) -> None:
+        """Continue from what ``state`` returned."""
+        memory = self._lowered.view(float)
+        own, memory[:] = np.split(np.array(state, dtype=float), [len(state) - memory.size])
+        self._restore(own)
+
+    @abstractmethod
+    def _restore(self, state: np.ndarray) -> None:
+        """Continue from the model's own state."""
+
+    @abstractmethod
+    def places(self) -> np.ndarray:
+        """Coordinates of its masses or bodies, (k,), in one array that steps keep up to date.
+
+        Heights of lumped masses and of an arm, and angles of a head; of a mechanism that is moved
+        body by body its positions and Euler parameters. Once it is caught, those at that time.
+        """
+
+    def base(self, time: float) -> float:
+        """Height at ``time`` [s] of the base that a mechanism's points count from [m]; how far a
+        vehicle has lifted it for lumped masses."""
+        return self._foot + lifted(self._base, time)[0]
+
+
+class SteppedHead(Pantograph):
+    """A head's strips on n coordinates, the head's own first, which a step advances together.
 
     Parameters
     ----------
@@ -35,7 +205,6 @@ class SteppedHead(ABC):
     steady_air : whether forces of the air, if there are any, stay as they are once it is raised
     """
 
-    stepped: native.Head
     _masses: np.ndarray
     _stiffness: np.ndarray
     _damping: np.ndarray
@@ -43,9 +212,9 @@ class SteppedHead(ABC):
     _mechanism: native.ReducedMechanism | None = None
 
     def __init__(self, head: HeadParts, n: int, stepping: Stepping, steady_air: bool) -> None:
-        raise_time, dt, beta, gamma, lateral, self._base = stepping
+        raise_time, dt, beta, gamma, lateral, base = stepping
+        super().__init__(head.offsets, base)
         s = len(head.offsets)
-        self.strip_offsets = head.offsets
         # The place of the wire on strips of a head that cannot roll makes no difference.
         moves = head.roll >= 0 or head.bending is not None
         self._part: Part = Raising(raise_time)
@@ -62,21 +231,17 @@ class SteppedHead(ABC):
         )
         self._state = np.zeros(3 * n)
         self._early = np.zeros((2, s))
-        self.head = HeadState(s)
         roll = -1 if self._lateral is None else head.roll
         self._arrays = native.HeadArrays(
             self._touch, self._state, self.head.numbers, self._newmark, roll
         )
-        self.row = np.zeros(drive_width(s))
-        self._rows = drives_by_name(self.row[None])
         # The time of what is in it, and when that stays as it is.
         self._driven = -np.inf
-        self._settled = raise_time if steady_air and self._base is None else np.inf
+        self._settled = raise_time if steady_air and base is None else np.inf
         self._laws = in_place((), (), n, (), s)
         self._bending = None if self._lateral is None else head.bending
         self._control: native.Regulation | None = None
         self._controller: Controller | None = None
-        self._time = 0.0
 
     def _step_by(self, stepped: native.Head) -> None:
         """Set the compiled head that steps this one, made of its arrays."""
@@ -86,7 +251,7 @@ class SteppedHead(ABC):
 
     @property
     def by_hand(self) -> bool:
-        """Whether a controller of one's own regulates it, which no kernel calls."""
+        """Whether a controller of one's own regulates it, in Python."""
         return self._controller is not None
 
     @property
@@ -133,9 +298,16 @@ class SteppedHead(ABC):
             self.stepped.regulate(self._control)
         elif regulator is not None:
             self._controller = regulator()
+            self.stepped.then(weakly(self._control_by_hand))
+
+    def _control_by_hand(self, time: float, contact_force: np.ndarray) -> None:
+        """Call the controller at the end of a step to ``time`` [s]."""
+        assert self._controller is not None
+        height = float((self._touch[0] @ self.position).mean())
+        added = self._controller.added_force(time, float(contact_force.sum()), height)
+        self.stepped.added_force = float(added)
 
     def follow(self, part: Part) -> None:
-        """Scale the lift by ``part``."""
         self._part, self._settled = part, np.inf
 
     @property
@@ -171,41 +343,20 @@ class SteppedHead(ABC):
         return self._state[self._n : 2 * self._n]
 
     def places(self) -> np.ndarray:
-        """Heights [m] and angles [rad], the head's first, shape (n,); a view of the state."""
         return self.position
 
-    def place(self, head_height: float, velocity: float = 0.0) -> None:
-        """Put the pantograph without contact to where its head is at this height [m].
-
-        Springs between its masses are relaxed, and all move upward with ``velocity`` [m/s].
-        """
+    def _place(self, head_height: float, velocity: float) -> None:
+        """Springs between masses are relaxed."""
         n = self._n
         self._state[:n] = head_height * self._level
         self._state[n : 2 * n] = velocity * self._level
         # A start from any other acceleration than what these forces cause loses an order in dt.
-        still = self._on_springs(self._arrays._replace(newmark=_NO_TIME))
-        self._drive(0.0)
+        still = self._on_springs(self._arrays._replace(newmark=NO_TIME))
+        super()._drive(0.0)
+        self._driven = 0.0
         if not still.step(self.row):
             self._refuse(still, 0.0)
         still.advance(np.zeros(len(self.strip_offsets)))
-
-    def predict(self, time: float) -> HeadState:
-        """Strips at ``time`` [s] as affine functions of the contact forces in the coming step.
-
-        Raises
-        ------
-        RunBroken
-            A mechanism has left the heights that it can reach.
-        """
-        self._aim(time)
-        if min(time, self._driven) < self._settled:
-            self._drive(time)
-        if not self.stepped.step(self.row):
-            self._refuse(self.stepped, time)
-        return self.head
-
-    def _refuse(self, left: native.Head, time: float) -> None:  # noqa: B027  (chains are endless)
-        """Raise RunBroken for a head that has left its heights in a step to ``time`` [s]."""
 
     def _on_springs(self, arrays: native.HeadArrays) -> native.Head:
         """A compiled head on its springs and laws, by the factors of Newmark's method in arrays."""
@@ -214,40 +365,25 @@ class SteppedHead(ABC):
         return head_of(arrays, sprung=native.SprungMasses(*masses, *driven))
 
     def _drive(self, time: float) -> None:
-        self._put_drives(np.array([time]), self._rows)
-        self._driven = time
-
-    @abstractmethod
-    def _put_drives(self, times: np.ndarray, rows: np.ndarray) -> None:
-        """Put into ``rows`` (n,) what steps to ``times`` (n,) [s] depend on besides the state and
-        wires."""
+        self._aim(time)
+        if min(time, self._driven) < self._settled:
+            super()._drive(time)
+            self._driven = time
+        self.row[0] = time
 
     def fill_drives(self, times: np.ndarray, drives: np.ndarray) -> None:
-        """Fill in what steps to ``times`` [s] depend on besides the state, a row each.
-
-        ``drives`` (len(times), `drive_width`) is what the loop of kernels steps it with; of heads
-        that roll or bend it has what is known of where wires cross their strips.
-        """
-        self._put_drives(times, drives_by_name(drives))
+        """As of all; rows of heads that roll or bend have what is known of where wires cross."""
+        super().fill_drives(times, drives)
         if self._lateral is not None:
             s = len(self.strip_offsets)
             self._lateral.fill_ahead(times, drives[:, N_DRIVE : N_DRIVE + 2 * s])
 
-    def extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Heights and velocities (s,) of the strips by Newmark's predictor (paper eq. 2.5)."""
+    def _extrapolate(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         self._aim(time)
         self.stepped.extrapolate(self.row, self._early)
         return self._early[0], self._early[1]
 
-    def advance(self, contact_force: np.ndarray) -> None:
-        self.stepped.advance(np.ascontiguousarray(contact_force, dtype=float))
-        if self._controller is not None:
-            height = float((self._touch[0] @ self.position).mean())
-            total = float(contact_force.sum())
-            added = self._controller.added_force(self._time, total, height)
-            self.stepped.added_force = float(added)
-
-    def state(self) -> np.ndarray:
+    def _own_state(self) -> list[np.ndarray]:
         """Positions, velocities and accelerations (3 n,); behind them the latest contact forces of
         a head with laws, and what regulates the lift remembers."""
         parts = [self._state]
@@ -258,9 +394,9 @@ class SteppedHead(ABC):
         elif self._controller is not None:
             own = np.asarray(self._controller.state(), dtype=float).ravel()
             parts += [np.array([self.added_force]), own]
-        return np.concatenate(parts)
+        return parts
 
-    def restore(self, state: np.ndarray) -> None:
+    def _restore(self, state: np.ndarray) -> None:
         begin = self._state.size
         self._state[:] = state[:begin]
         if self._has_laws:
@@ -276,7 +412,6 @@ class SteppedHead(ABC):
 
     def _aim(self, time: float) -> None:
         """Set the place of the wire on the strips at ``time`` [s], the end of the coming step."""
-        self._time = time
         if self._lateral is not None:
             self._lateral.move_to(time)
             s = self._lateral.place.size
