@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.meshgen.geometry import Cuts, cuts_at
 from catenary.meshgen.line import Clamps, Droppers, Line, SteadyArms, Supports
 from catenary.meshgen.topologies.line_data import FreeDroppers, FreeLink, FreeWire, LineData
 from catenary.meshgen.wires import Conductor, End, Piece, Profile, Role, Taken, Wire
@@ -23,30 +24,11 @@ GRAVITY = 9.81
 _Group = TypeVar("_Group", FreeDroppers, Clamps, SteadyArms, Supports)
 
 
-def line_of(
-    data: LineData,
-    topology: str,
-    wires: tuple[FreeWire, ...],
-    links: tuple[FreeLink, ...],
-    twins: tuple[tuple[str, str], ...] = (),
-) -> Line:
-    """The line of some wires and links. Contact wires come first, the others as listed.
+def line_of(data: LineData) -> Line:
+    """The line of listed wires and links. Contact wires come first, the others as listed.
 
     A contact wire, a wire that droppers hang, and one that supports or arms are to hold at its
     height have that height at rest; the others hang between what carries them.
-
-    Parameters
-    ----------
-    data : LineData
-        Masts, and the rise of transition spans.
-    topology : str
-        Name of the topology.
-    wires : tuple of FreeWire
-        Wires of the line, contact wires first.
-    links : tuple of FreeLink
-        Groups of droppers, clamps, steady arms and supports.
-    twins : tuple of tuple, optional
-        Pairs of names of wires, as of a ``Line``.
 
     Raises
     ------
@@ -54,7 +36,8 @@ def line_of(
         If there is no contact wire, or wires are clamped to each other or hang from each other in a
         circle.
     """
-    data = replace(data, wires=wires, links=links)
+    wires, links = data.wires, data.links
+    assert wires is not None and links is not None
     by_name = {wire.name: wire for wire in wires}
     if not any(wire.role is Role.CONTACT for wire in wires):
         raise InputError("no wire of the line has the role contact")
@@ -67,13 +50,14 @@ def line_of(
     return Line(
         data.span_lengths,
         data.n_transition,
-        topology,
+        data.topology,
         tuple(replace(wire, taken=_taken(wire.name, wires)) for wire in listed),
         tuple(_plain(group) for group in droppers),
         _of_kind(links, SteadyArms),
         _of_kind(links, Supports),
         (*_of_kind(links, Clamps), *_end_clamps(wires)),
-        twins=twins,
+        curve=data.curve,
+        twins=data.twins,
     )
 
 
@@ -120,6 +104,19 @@ def carriers(data: LineData, wire: FreeWire) -> np.ndarray:
             ends = zip(other.clamped_to, (0, 1), strict=True)
             places += [s[end] for name, end in ends if name == wire.name for s in other.stretches]
     return np.unique(places)
+
+
+def cuts_of(data: LineData) -> Cuts:
+    """Places at which the wires are cut: masts, ends of wires, and links."""
+    assert data.wires is not None and data.links is not None
+    ends = [x for wire in data.wires for stretch in wire.stretches for x in stretch]
+    hanging, placed = [], []
+    for link in data.links:
+        if isinstance(link, FreeDroppers):
+            hanging += [link.upper_x, link.lower_x]
+        else:
+            placed.append(link.x)
+    return cuts_at(data.support_positions, ends, *hanging, *placed)
 
 
 def _of_kind(links: tuple[FreeLink, ...], kind: type[_Group]) -> tuple[_Group, ...]:
@@ -319,6 +316,6 @@ def _profile(data: LineData, free: FreeWire) -> Profile:
         height,
         tuple(x[order].tolist()),
         tuple(sag[order].tolist()),
-        (data.whole(data.transition_rise),),
+        free.sections or data.sections,
         *course,
     )

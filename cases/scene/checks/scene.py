@@ -28,7 +28,7 @@ from catenary.cases.scene.keys.units import USUAL, unit_guess, unit_of
 from catenary.cases.scene.run.case import chosen_books
 from catenary.cases.scene.scene import Scene, end_of, strips_ahead
 from catenary.meshgen.slowest_wave import bends, slowest_wave
-from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.all_topologies import listed, make_line
 from catenary.meshgen.topologies.line_data import LineData
 from catenary.postproc.channels.header import in_sentence, places_on_train
 from catenary.postproc.record.snapshots.contents import OTHER_PARTS
@@ -65,14 +65,12 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.collect(_pantograph_names, scene):
         found.collect(pantographs.check_pantographs, scene)
         found.collect(pantographs.check_laws, scene)
-    # A scene that is too large is not made; consequences of a wrong unit are not reported.
-    sound = not whole or found.collect(mesh_size.size_faults, scene)
-    sound = sound and found.collect(usual_faults, scene)
-    line = _line(scene, found) if sound and whole else None
-    if line is None:
+    # Consequences of a wrong unit are not reported; a scene that is too large is not made.
+    usual = found.collect(usual_faults, scene)
+    line = _line(scene, found) if usual and whole else None
+    if line is None or not found.collect(mesh_size.size_faults, scene):
         return found.faults
-    if not found.collect(line_tables.check_parts, scene, line):
-        return found.faults
+    line = listed(line)
     if not found.collect(line_tables.check_names, scene, line):
         return found.faults
     of_lines = (
@@ -127,7 +125,7 @@ class _Findings:
 
 
 def _line(scene: Scene, found: _Findings) -> LineData | None:
-    """The line of a scene, None if its droppers do not fit into its spans."""
+    """The line of a scene, None if its parts do not fit together."""
     try:
         line = scene.line_data
     except InputError as error:
@@ -135,7 +133,7 @@ def _line(scene: Scene, found: _Findings) -> LineData | None:
         return None
     checks = line_tables.check_droppers_inside_spans, free.check_free_droppers
     inside = [found.collect(of_line, scene, line) for of_line in checks]
-    return line if all(inside) else None
+    return line if all(inside) and found.collect(line_tables.check_parts, scene, line) else None
 
 
 def _test_keys(scene: Scene) -> Iterator[Fault]:

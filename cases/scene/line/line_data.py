@@ -291,8 +291,8 @@ def _places(
         return tuple(table.at_m)
     if table.supports is not None:
         return tuple(masts[table.supports].tolist())
-    inner = masts[1:-1].tolist()
-    return tuple(x for x in inner if wire is not None and wire.passes(x, -SAME_PLACE))
+    inner = masts[1:-1]
+    return () if wire is None else tuple(inner[wire.passes(inner, -SAME_PLACE)].tolist())
 
 
 def _droppers(
