@@ -200,7 +200,7 @@ def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
         below = lower - made.wire(group.upper).points(np.array(group.upper_x))[:, 2]
         if not (below >= 0.0).any():
             continue
-        worst = int(np.argmax(below))
+        worst = int(np.argmax(below > below.max() - SAME_PLACE))  # the first of like ones
         if line.topology == FREE:
             links = [i for i, own in enumerate(line.links or ()) if isinstance(own, FreeDroppers)]
             why = (
