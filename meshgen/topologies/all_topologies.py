@@ -250,8 +250,8 @@ def _wire(
 
 
 def _contact(data: LineData, name: str = CONTACT_WIRE, sideways: float = 0.0) -> FreeWire:
-    conductor, height = data.contact_wire, data.contact_height
-    return _wire(data, conductor, name, Role.CONTACT, height, sideways)
+    assert data.contact_wire is not None
+    return _wire(data, data.contact_wire, name, Role.CONTACT, data.contact_height, sideways)
 
 
 def _messenger(data: LineData, name: str = MESSENGER_WIRE, sideways: float = 0.0) -> FreeWire:

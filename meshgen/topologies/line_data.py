@@ -160,7 +160,7 @@ class LineData(Spans):
     stagger : (n_spans + 1,) lateral position of the contact wire at each support [m]
     contact_height : height of the contact wire at the supports of the running spans [m]
     encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
-    contact_wire, messenger_wire : conductors, None for the latter if there is none
+    contact_wire, messenger_wire : conductors, None of a free line or if there is none
     dropper : kind of the contact wire's droppers
     support_stiffness : vertical stiffness of the topmost wire's support at a mast [N/m]
     steady_arm : the arms at the inner supports
@@ -180,7 +180,7 @@ class LineData(Spans):
     stagger: tuple[float, ...]
     contact_height: float
     encumbrance: float
-    contact_wire: Conductor
+    contact_wire: Conductor | None
     messenger_wire: Conductor | None
     dropper: DropperKind | None
     support_stiffness: float
@@ -231,15 +231,14 @@ class LineData(Spans):
         return tuple(map(Section, stretches, level, pairwise([*rises, self.transition_rise])))
 
     @property
-    def lowest_contact(self) -> float:
-        """Height at which a contact wire is to hang at its lowest [m]."""
-        assert self.wires is not None and self.links is not None
-        contact = [wire for wire in self.wires if wire.role is Role.CONTACT]
+    def contact_heights(self) -> tuple[float, float]:
+        """Heights at which contact wires are to hang at their lowest and at their highest [m]."""
+        contact = [wire for wire in self.wires or () if wire.role is Role.CONTACT]
         names = [wire.name for wire in contact]
-        hanging = [link for link in self.links if isinstance(link, FreeDroppers)]
+        hanging = [link for link in self.links or () if isinstance(link, FreeDroppers)]
         sags = [max(link.pre_sag, default=0.0) for link in hanging if link.lower in names]
-        heights = [min(wire.heights.value) for wire in contact if wire.heights is not None]
-        return min(heights) - max(sags, default=0.0)
+        heights = [z for wire in contact if wire.heights is not None for z in wire.heights.value]
+        return min(heights) - max(sags, default=0.0), max(heights)
 
     def contact_sideways(self, x: np.ndarray) -> list[np.ndarray]:
         """Lateral positions of each contact wire at places ``x``, shape as ``x`` [m].

@@ -104,8 +104,8 @@ def check_effect_data(scene: Scene) -> Iterator[Fault]:
     elif on and not hung.residual_stiffness_ratio:
         why = f"effects.{name} is on and needs a value greater than 0"
         yield scene.refused(f"{key}.residual_stiffness_ratio", why)
-    elif hung.residual_stiffness_ratio and not on and name not in scene.effects:
-        yield scene.needs_effect(f"{key}.residual_stiffness_ratio", name)
+    elif hung.residual_stiffness_ratio:
+        yield from scene.needs_effect(name, f"{key}.residual_stiffness_ratio")
     n = len(scene.train.pantographs)
     if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
         key = "effects.several_pantographs"

@@ -33,7 +33,7 @@ from catenary.meshgen.topologies.line_data import (
     FreeDroppers,
     LineData,
 )
-from catenary.meshgen.wires import SAME_PLACE, Conductor, End, Wire
+from catenary.meshgen.wires import SAME_PLACE, End, Wire
 from catenary.solver.problem.ends import AlongTrack
 from catenary.solver.problem.problem import Problem
 
@@ -82,12 +82,11 @@ def check_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
     if line.wires is not None:
         yield from check_free_places(scene, line)
         return
-    messenger = line.messenger_wire
-    if line.stitch_wire is not None and messenger is not None:
-        yield from _clamped(scene, line, "stitch_wire", line.stitch_wire, messenger)
+    if line.stitch_wire is not None:
+        yield from _clamped(scene, line, "stitch_wire", line.stitch_wire, "messenger_wire")
         yield from _stitch_wire(scene, line, line.stitch_wire.length)
     if line.bridle is not None:
-        yield from _clamped(scene, line, "bridle", line.bridle, line.contact_wire)
+        yield from _clamped(scene, line, "bridle", line.bridle, "contact_wire")
     yield from _auxiliary_wire(scene, line)
     yield from _overlap(scene, line)
 
@@ -105,20 +104,20 @@ def check_names(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _clamped(
-    scene: Scene, line: LineData, part: str, wire: ClampedWire, bearer: Conductor
+    scene: Scene, line: LineData, part: str, wire: ClampedWire, bearer: str
 ) -> Iterator[Fault]:
     """Wires clamped to another one at supports that are none, overlap, or take all its tension."""
-    shortest, name = min(line.span_lengths), "messenger" if part == "stitch_wire" else "contact"
+    shortest, whole = min(line.span_lengths), getattr(line, bearer).tension
     if line.n_spans < 2:
         why = f"a line with {part.replace('_', ' ')}s needs a support, that is two spans"
         yield scene.refused("line.n_spans", why)
     if wire.length >= shortest:
         why = f"it must be less than the shortest span ({shortest:g} m)"
         yield scene.refused(f"line.{part}.length_m", why)
-    if wire.conductor.tension >= bearer.tension:
+    if wire.conductor.tension >= whole:
         yield scene.refused(
             f"line.{part}.tension_N",
-            f"it must be less than line.{name}_wire.tension_N ({bearer.tension:g} N), of which it "
+            f"it must be less than line.{bearer}.tension_N ({whole:g} N), of which it "
             "takes its part between the clamps",
         )
 
@@ -224,8 +223,6 @@ def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
 def check_lateral(scene: Scene) -> Iterator[Fault]:
     """Keys of lateral motion without it."""
     line = scene.line
-    if scene.switches()[_ACROSS]:
-        return
     given = {
         "line.messenger_stagger_m": line.messenger_stagger_m,
         "line.curve.radius_m": line.curve,
@@ -234,17 +231,13 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
     for key, arm in arm_tables(line).items():
         for name in ("inclination_deg", "registration_stiffness_N_per_m"):
             given[f"{key}.{name}"] = getattr(arm, name)
-    for key, value in given.items():
-        if value is not None and _ACROSS not in scene.effects:
-            yield scene.needs_effect(key, _ACROSS)
+    yield from scene.needs_effect(_ACROSS, *(key for key in given if given[key] is not None))
 
 
 def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Data that motion along the track lacks, and data that only it has a use for."""
     on = scene.switches()[_ALONG]
-    if not on and _ALONG not in scene.effects:
-        for key in _data_of_effect(scene):
-            yield scene.needs_effect(key, _ALONG)
+    yield from scene.needs_effect(_ALONG, *_data_of_effect(scene))
     yield from _mid_points(scene, line)
     yield from _weights(scene, line)
     if not scene.origin.recorded:

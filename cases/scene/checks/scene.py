@@ -30,6 +30,7 @@ from catenary.cases.scene.scene import Scene, end_of, strips_ahead
 from catenary.meshgen.slowest_wave import bends, slowest_wave
 from catenary.meshgen.topologies.all_topologies import listed, make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import Role
 from catenary.postproc.channels.header import in_sentence, places_on_train
 from catenary.postproc.record.snapshots.contents import OTHER_PARTS
 from catenary.postproc.standards.rule_books import (
@@ -177,10 +178,11 @@ def _speed(scene: Scene, line: LineData) -> Iterator[Fault]:
     speed = scene.train.speed_km_h
     if not scene.holds(Limit.WAVE_SPEED):
         return
-    wave = slowest_wave(make_line(line))
+    made = make_line(line)
+    wave = slowest_wave(made)
     if speed < 3.6 * wave:
         return
-    wire = line.contact_wire
+    wire = min(made.wires_of(Role.CONTACT), key=lambda one: one.wave_speed)
     of = f"tension_N = {wire.tension:g} and mass_kg_per_m = {wire.mass_per_length:g}"
     if bends(wave, wire.tension, wire.mass_per_length):
         of = f"bending_stiffness_N_m2 = {wire.bending_stiffness:g}, {of} between its supports"

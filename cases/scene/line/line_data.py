@@ -40,7 +40,7 @@ from catenary.meshgen.topologies.line_data import (
     Overlaps,
     Twin,
 )
-from catenary.meshgen.wires import SAME_PLACE, Conductor, Role
+from catenary.meshgen.wires import SAME_PLACE, Role
 from catenary.solver.problem.ends import AlongTrack, Tensioner
 
 
@@ -56,7 +56,6 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
     hung = table.dropper
     wires = free_wires(table, spans)
     links = free_links(table, origin, spans, wires)
-    contact_height, contact_wire, stagger = _contact_of(table, wires)
     droppers = [Hung((), ())] * table.n_spans
     if hung is not None:
         droppers = list(hung_in(origin, "line.dropper", hung, numbered(spans)).values())
@@ -66,14 +65,14 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
         span_lengths=spans,
         dropper_positions=tuple(own.positions for own in droppers),
         pre_sag=tuple(pre_sag),
-        stagger=stagger,
+        stagger=staggered(table.stagger_m, table.n_spans),
         messenger_stagger=_optional(
             lambda own: staggered(own, table.n_spans), table.messenger_stagger_m
         ),
         curve=_optional(curve_of, table.curve),
-        contact_height=contact_height,
+        contact_height=table.contact_height_m,
         encumbrance=table.encumbrance_m or 0.0,
-        contact_wire=contact_wire,
+        contact_wire=_optional(conductor, table.contact_wire),
         messenger_wire=_optional(conductor, table.messenger_wire),
         dropper=None if hung is None else dropper_kind(hung, hung.contact_clamp_kg),
         support_stiffness=table.support.stiffness_N_per_m,
@@ -89,27 +88,6 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
         wires=wires,
         links=links,
     )
-
-
-def _contact_of(
-    table: LineTable, wires: tuple[FreeWire, ...] | None
-) -> tuple[float, Conductor, tuple[float, ...]]:
-    """Height, conductor and stagger of the contact wire; of several the one with the slowest waves.
-
-    ValueError if there is none, which checks report.
-    """
-    stagger = staggered(table.stagger_m, table.n_spans)
-    if table.contact_wire is not None:
-        return table.contact_height_m, conductor(table.contact_wire), stagger
-    contact = [wire for wire in wires or () if wire.role is Role.CONTACT]
-    if not contact:
-        raise ValueError("the line has no contact wire")
-    slowest = min(contact, key=lambda wire: wire.conductor.wave_speed)
-    assert slowest.heights is not None
-    if slowest.lateral is not None:
-        supports = mast_places(span_lengths(table))
-        stagger = tuple(slowest.lateral.at(supports).tolist())
-    return max(slowest.heights.value), slowest.conductor, stagger
 
 
 _Table = TypeVar("_Table")
