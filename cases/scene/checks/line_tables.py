@@ -14,16 +14,16 @@ import numpy as np
 from catenary.cases.scene.checks.free import check_free_places, check_free_tables, droppers_inside
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.table import take_away
+from catenary.cases.scene.line.hardware import SteadyArmTable
 from catenary.cases.scene.line.imperfections import WrongTensionTable
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import (
     TENSIONER,
     along_of,
-    arm_tables,
     numbered,
-    wire_tables,
+    tables_of,
 )
-from catenary.cases.scene.line.wires import FreeWireTable
+from catenary.cases.scene.line.wires import FreeWireTable, WireTable
 from catenary.cases.scene.run.incidents import DropperBreakTable, TensionLossTable
 from catenary.cases.scene.scene import Scene
 from catenary.meshgen.topologies.all_topologies import FREE, make_line, registered
@@ -228,7 +228,7 @@ def check_lateral(scene: Scene) -> Iterator[Fault]:
         "line.curve.radius_m": line.curve,
         "line.damping.lateral": line.damping.lateral,
     }
-    for key, arm in arm_tables(line).items():
+    for key, arm in tables_of(line, SteadyArmTable).items():
         for name in ("inclination_deg", "registration_stiffness_N_per_m"):
             given[f"{key}.{name}"] = getattr(arm, name)
     yield from scene.needs_effect(_ACROSS, *(key for key in given if given[key] is not None))
@@ -295,7 +295,7 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
 
 
 def _without_stiffness(scene: Scene) -> Iterator[Fault]:
-    for key, wire in wire_tables(scene.line).items():
+    for key, wire in tables_of(scene.line, WireTable).items():
         if wire.stiffness_along() is None:
             field = LineTable.model_fields.get(key.removeprefix("line."))
             what = wire.name if isinstance(wire, FreeWireTable) else field and field.description
@@ -309,7 +309,10 @@ def _without_stiffness(scene: Scene) -> Iterator[Fault]:
 def _without_length(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Arms without a length, along which nothing could swing."""
     made = make_line(line)
-    keys = {getattr(table, "name", ""): key for key, table in arm_tables(scene.line).items()}
+    keys = {
+        getattr(table, "name", ""): key
+        for key, table in tables_of(scene.line, SteadyArmTable).items()
+    }
     for arms in made.steady_arms:
         if arms.kind.length == 0 and made.wire(arms.wire).radial_force(np.array(arms.x)).any():
             yield scene.refused(

@@ -18,7 +18,8 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.keys.table import StretchTable, take_away
 from catenary.cases.scene.keys.units import speed_from_km_h
-from catenary.cases.scene.line.line_data import wire_tables
+from catenary.cases.scene.line.line_data import tables_of
+from catenary.cases.scene.line.wires import WireTable
 from catenary.cases.scene.run.wind import wind_of
 from catenary.cases.scene.scene import Scene, end_of, pantograph_of, static_force, strips_ahead
 from catenary.cases.scene.train.mechanism import ActuatorTable
@@ -387,7 +388,7 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     if table is None:
         return
     if scene.switches()["wind"] and table.speed_m_per_s > 0.0:
-        for name, wire in wire_tables(scene.line).items():
+        for name, wire in tables_of(scene.line, WireTable).items():
             if wire.diameter_mm is None:
                 why = "the drag of the wind depends on it; give it, or write effects.wind = false"
                 yield scene.missing(f"{name}.diameter_mm", "", why, of=name)

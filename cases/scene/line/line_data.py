@@ -12,7 +12,6 @@ from catenary.cases.scene.keys.units import length_from_mm
 from catenary.cases.scene.line.hardware import (
     DropperTable,
     Hung,
-    SteadyArmTable,
     dropper_kind,
     hung_in,
     steady_arm,
@@ -25,7 +24,6 @@ from catenary.cases.scene.line.wires import (
     FreeDroppersTable,
     FreeSupportsTable,
     FreeWireTable,
-    WireTable,
     clamped_wire_of,
     conductor,
 )
@@ -329,30 +327,16 @@ def along_of(table: LineTable) -> AlongTrack:
 
 def hanging_table(table: LineTable) -> DropperTable | None:
     """The table that says what slack droppers do; of a free line that of its first droppers."""
-    return next(iter(dropper_tables(table).values()), None)
+    return next(iter(tables_of(table, DropperTable).values()), None)
 
 
-def wire_tables(table: LineTable) -> dict[str, WireTable]:
-    """Tables of all wires of a line by their keys."""
+def tables_of(table: LineTable, kind: type[_Table]) -> dict[str, _Table]:
+    """Tables of a kind, such as all of wires, by their keys; of a free line those in its lists."""
     own = {f"line.{name}": getattr(table, name) for name in LineTable.model_fields}
-    own |= {f"line.wires.{i}": wire for i, wire in enumerate(table.wires or [])}
-    return {key: wire for key, wire in own.items() if isinstance(wire, WireTable)}
-
-
-def arm_tables(table: LineTable) -> dict[str, SteadyArmTable]:
-    """Tables of all steady arms of a line by their keys."""
-    if table.links is None:
-        return {"line.steady_arm": table.steady_arm}
-    links = enumerate(table.links)
-    return {f"line.links.{i}": link for i, link in links if isinstance(link, FreeArmsTable)}
-
-
-def dropper_tables(table: LineTable) -> dict[str, DropperTable]:
-    """Tables of all droppers that give pre-sag by their keys."""
-    if table.dropper is not None:
-        return {"line.dropper": table.dropper}
-    links = enumerate(table.links or [])
-    return {f"line.links.{i}": link for i, link in links if isinstance(link, FreeDroppersTable)}
+    if table.wires is not None or table.links is not None:
+        lists = {"line.wires": table.wires, "line.links": table.links}
+        own = {f"{key}.{i}": one for key, ones in lists.items() for i, one in enumerate(ones or [])}
+    return {key: one for key, one in own.items() if isinstance(one, kind)}
 
 
 def staggered(given: list[float], n_spans: int) -> tuple[float, ...]:
