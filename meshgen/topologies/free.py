@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from catenary.base.errors import InputError
-from catenary.meshgen.build import Cuts, cuts_at
+from catenary.meshgen.geometry import Cuts, cuts_at
 from catenary.meshgen.line import Clamps, Droppers, Line, SteadyArms, Supports
 from catenary.meshgen.topologies.line_data import FreeDroppers, FreeLink, FreeWire, LineData
 from catenary.meshgen.wires import Conductor, End, Piece, Profile, Role, Taken, Wire

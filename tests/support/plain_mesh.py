@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from catenary.meshgen.build import find_cuts
+from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import End

@@ -9,7 +9,7 @@ import numpy as np
 from plain_mesh import mesh_on
 
 from catenary.mbs.lumped_data import LumpedData
-from catenary.meshgen.build import find_cuts
+from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.line import DropperKind, Line, SteadyArm
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.topologies.all_topologies import make_line

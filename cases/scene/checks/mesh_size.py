@@ -16,7 +16,7 @@ from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.wires import FreeDroppersTable
 from catenary.cases.scene.scene import Scene
-from catenary.meshgen.build import divisions_of
+from catenary.meshgen.geometry import divisions_of
 from catenary.meshgen.topologies.all_topologies import listed
 from catenary.meshgen.topologies.free import cuts_of
 from catenary.meshgen.topologies.line_data import FreeDroppers
