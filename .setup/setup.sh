@@ -2,7 +2,7 @@
 # Sets up .venv with everything that Catenary needs; called by `make setup`, safe to repeat. With
 # --tests also what its tests, lint and documentation need: half of the packages.
 #
-# Debian and Ubuntu: PETSc, MPI, HDF5, libraries of gmsh (for tests), a C++ compiler come from apt, the
+# Debian and Ubuntu: PETSc, MPI, HDF5, gmsh's shared libraries and a C++ compiler come from apt, the
 # rest from the package index. Elsewhere (clusters, conda) the python3 on the PATH must bring
 # petsc4py, mpi4py and h5py, and a C++ compiler must be there. Either way the environment sees five
 # packages of the system and no others. Bounds of versions stand in pyproject.toml, the tested ones
@@ -12,8 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 # a|b: either will do, a is installed if none is there. The module h5py that chooses between the
 # serial and the MPI build lies in python3-h5py since Debian 13, in python3-h5py-serial before.
-# The wheel of gmsh, which tests load, links to these libraries of OpenGL and X (ldd libgmsh.so),
-# though no window is opened.
+# gmsh's wheel links to these libraries of OpenGL and X (ldd libgmsh.so), though no window is opened.
 # WeasyPrint, which writes reports as PDF, loads Pango and HarfBuzz.
 DEBIAN_PACKAGES=(
     python3-petsc4py-real python3-mpi4py python3-h5py-mpi "python3-h5py|python3-h5py-serial"
@@ -197,7 +196,7 @@ explain() {
     fi
     cat >&2 <<'TEXT'
   Debian, Ubuntu:  run `make setup` as root or as a user who may use sudo.
-  conda-forge:     conda create -n catenary -c conda-forge python petsc petsc4py mpi4py h5py scipy make cxx-compiler
+  conda-forge:     conda create -n catenary -c conda-forge python petsc petsc4py mpi4py h5py scipy gmsh make cxx-compiler
                    conda activate catenary, then make setup
   Cluster:         load the modules of PETSc with petsc4py, mpi4py and h5py for one Python, typically
                    module load petsc4py mpi4py h5py      (or: petsc, python, h5py-mpi)

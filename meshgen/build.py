@@ -24,10 +24,9 @@ def make_mesh(
     support_refinement: int = 1,
     grading: float = 1.0,
 ) -> LineMesh:
-    """Mesh ``line``. Not collective: call it on one rank.
+    """Mesh ``line``, in a file with Gmsh. Not collective: call it on one rank.
 
-    All wires are cut at every mast, dropper and end of a wire and divided in between; a dropper is
-    one element. Heights are wanted or estimated ones; form finding corrects them.
+    Without a file the wires are divided in the same way, to Gmsh's accuracy of some nanometres.
 
     Parameters
     ----------
@@ -36,24 +35,29 @@ def make_mesh(
     elements_per_gap : int
         Elements between neighbouring cuts (masts, droppers) of a wire.
     path : Path, optional
-        File to which the mesh is written; None for none.
+        Path of the mesh file to be kept; None to keep none.
     support_refinement : int, optional
         Factor on the number of elements in the gaps next to a mast.
     grading : float, optional
-        How many times longer elements are amid a gap than at its cuts; 1 divides evenly.
+        How many times longer elements are amid a gap than at its cuts.
 
     Raises
     ------
-    InputError, RunBroken
-        As ``catenary.meshgen.mesh_file.write_mesh``.
+    InputError
+        As ``catenary.meshgen.gmsh_lines.write_mesh``.
     """
-    cuts = find_cuts(line)
-    groups = divide(line, cuts, divisions_of(cuts, elements_per_gap, support_refinement), grading)
     if path is not None:
-        from catenary.meshgen.mesh_file import write_mesh  # meshio takes long to import
+        # Gmsh and meshio take long to import.
+        from catenary.meshgen.gmsh_lines import write_mesh
+        from catenary.meshgen.reader import read_mesh
 
-        write_mesh(groups, path)
-    return assemble(groups, line, "the line")
+        write_mesh(
+            line, elements_per_gap, path, support_refinement=support_refinement, grading=grading
+        )
+        return read_mesh(path, line)
+    cuts = find_cuts(line)
+    divisions = divisions_of(cuts, elements_per_gap, support_refinement)
+    return assemble(divide(line, cuts, divisions, grading), line, "the line")
 
 
 def use_mesh(line: Line, path: Path) -> LineMesh:
@@ -65,9 +69,9 @@ def use_mesh(line: Line, path: Path) -> LineMesh:
     Raises
     ------
     InputError
-        If ``catenary.meshgen.mesh_file.read_mesh`` refuses the file, or it belongs to another line.
+        If the file is refused by ``catenary.meshgen.reader.read_mesh`` or belongs to another line.
     """
-    from catenary.meshgen.mesh_file import read_mesh
+    from catenary.meshgen.reader import read_mesh
 
     mesh = read_mesh(path, line)
     for what, found, wanted in _places(line, mesh):

@@ -30,7 +30,7 @@ LEAST_MEMORY = 700_000_000
 CACHE_VARIABLE = "MPLCONFIGDIR"
 _MATPLOTLIBRC, _MATPLOTLIBRC_HERE = "MATPLOTLIBRC", Path("matplotlibrc")
 # Python packages that leave a record of their version, in the order in which they are printed.
-_PACKAGES = ("numpy", "scipy", "meshio", "pydantic", "typer")
+_PACKAGES = ("numpy", "scipy", "gmsh", "meshio", "pydantic", "typer")
 
 
 def choose_settings() -> None:

@@ -1,4 +1,4 @@
-"""The mesh of a scene: made from its line, or the user's own."""
+"""The mesh of a scene: made from its line, or the user's own. Gmsh runs in here."""
 
 from __future__ import annotations
 

@@ -35,8 +35,11 @@ class Catenary(PythonPackage):
         depends_on("py-tomli-w@1:1")
         depends_on("py-cma@4:4")
 
+    # Its module for Python, gmsh.py, lies beside the library.
+    depends_on("gmsh@4.11:4.15 +shared", type=("build", "run"))
     depends_on("petsc@3.18:3 +mpi +mumps", type=("build", "run"))
 
     def setup_run_environment(self, env):
-        """One thread a rank."""
+        """One thread a rank, and the place of gmsh.py."""
         env.set("OMP_NUM_THREADS", "1")
+        env.prepend_path("PYTHONPATH", self.spec["gmsh"].prefix.lib)

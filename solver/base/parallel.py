@@ -29,7 +29,7 @@ NO_MEMORY = (
 def on_root(comm: Any, work: Callable[[], T], *, takes_long: bool = False) -> T:
     """Result of ``work()`` run on rank 0 only, given to all ranks; they all raise its error.
 
-    Collective. Used for everything that touches files: after a failure all
+    Collective. Used for everything that touches files or gmsh: after a failure all
     ranks raise the same error, so that none waits for another.
 
     Parameters

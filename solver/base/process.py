@@ -1,7 +1,9 @@
-"""What libraries do to this process, and what keeps them from it: MPI, PETSc, malloc.
+"""What libraries do to this process, and what keeps them from it: MPI, PETSc, Gmsh, malloc.
 
 MPI in a process that no launcher has started goes without what reaches other processes. PETSc takes
-nearly all signals when it starts. Memory that has been freed is given back to the system.
+nearly all signals when it starts; Gmsh, which is linked with a PETSc of its own, sets them back to
+the system's, under which SIGTERM and SIGHUP end the process without a word. Memory that has been
+freed is given back to the system.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ import sys
 from pathlib import Path
 
 PACKAGES = (
-    "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio",
+    "gmsh", "jinja2", "matplotlib.backends.backend_agg", "matplotlib.figure", "meshio",
     "pandas", "pydantic", "scipy.integrate", "scipy.interpolate", "scipy.optimize", "scipy.signal",
     "scipy.sparse.linalg", "tqdm", "typer",
     # Of the program, with what they import:

@@ -59,7 +59,7 @@ def test_quiet_and_verbose_exclude_each_other() -> None:
     assert "--quiet and --verbose exclude each other" in done.output
 
 
-@pytest.mark.parametrize("library", ["PETSc", "MPI", "HDF5", "h5py", "mpi4py", "meshio"])
+@pytest.mark.parametrize("library", ["PETSc", "MPI", "HDF5", "h5py", "mpi4py", "gmsh"])
 def test_version_names_the_libraries(library: str) -> None:
     done = invoke("--version")
     assert done.exit_code == 0

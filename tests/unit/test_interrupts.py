@@ -225,10 +225,11 @@ def test_a_second_signal_goes_to_the_handler_of_the_other_program() -> None:
 
 @pytest.mark.process
 def test_libraries_leave_the_handlers_as_they_are(tmp_path: Path) -> None:
-    """PETSc sets handlers of its own when it starts."""
+    """PETSc and Gmsh set handlers of their own when they start."""
     script = """
 import os, signal
 from catenary.cases.process import interrupts
+from catenary.cases.scene.load import load_scene
 interrupts.install(several_ranks=False)
 def check(what):
     for number in interrupts.STOPPING:
@@ -240,11 +241,14 @@ def check(what):
 from catenary.cases.process.petsc_options import start_petsc
 start_petsc([])
 check("petsc")
+from catenary.cases.run.scene_mesh import mesh_of
+mesh_of(load_scene("en50318_2002"))
+check("gmsh")
 os._exit(0)
 """
     done = subprocess.run(
         [sys.executable, "-u", "-c", script], capture_output=True, text=True, cwd=tmp_path
     )
     names = [number.name for number in STOPPING]
-    expected = [f"petsc {name}" for name in names]
+    expected = [f"{what} {name}" for what in ("petsc", "gmsh") for name in names]
     assert done.stdout.splitlines() == expected, done.stderr

@@ -13,7 +13,8 @@ ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "packaging"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # Names of the package index that conda-forge and Spack spell in another way.
-OF_CONDA = {"matplotlib": "matplotlib-base"}
+OF_CONDA = {"matplotlib": "matplotlib-base", "gmsh": "python-gmsh"}
+OF_SPACK = {"gmsh": "gmsh"}
 
 
 def wanted() -> dict[str, str]:
@@ -39,7 +40,7 @@ def test_the_package_of_spack_has_the_same_dependencies() -> None:
     ]
     needs = {name: bounds for name, _, bounds in (spec.partition("@") for spec in specs)}
     for name, bounds in wanted().items():
-        found = needs[f"py-{name}"]
+        found = needs[OF_SPACK.get(name, f"py-{name}")]
         least, below = re.fullmatch(r">=([\d.]+),<([\d.]+)", bounds).groups()
         first, _, last = found.partition(":")
         assert first == least, name

@@ -14,7 +14,7 @@ from catenary import InputError
 from catenary.meshgen.build import make_mesh, use_mesh
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
-from catenary.meshgen.mesh_file import read_mesh
+from catenary.meshgen.reader import read_mesh
 from catenary.meshgen.topologies.all_topologies import make_line as line_from
 from catenary.meshgen.topologies.line_data import LineData
 

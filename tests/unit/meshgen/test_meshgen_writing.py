@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
 import gmsh
-import meshio
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,12 +15,14 @@ from hypothesis import strategies as st
 
 from catenary import InputError, RunBroken
 from catenary.meshgen.build import make_mesh
+from catenary.meshgen.gmsh_lines import write_mesh
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
-from catenary.meshgen.mesh_file import read_mesh
+from catenary.meshgen.reader import read_mesh
 from catenary.meshgen.topologies.all_topologies import make_line as line_from
 from catenary.meshgen.topologies.line_data import LineData
 
-# Sums of lengths of a line of 300 m, with room.
+# Gmsh finds the parameter of each node to 1e-12 of the line's length, and writes 16 digits.
 PLACE = 1e-8
 
 
@@ -191,15 +192,27 @@ def test_any_spans_and_droppers_are_meshed_as_described(
     assert mesh.steady_arms.size == mesh.supports.size == n - 1
 
 
-def test_a_mesh_file_holds_the_mesh(make_line: Callable[..., LineData], tmp_path: Path) -> None:
-    path, line = tmp_path / "line.msh", line_from(make_line())
-    made = make_mesh(line, 7, path, support_refinement=2, grading=6.0)
-    found = read_mesh(path, line)
-    np.testing.assert_array_equal(found.points, made.points)
-    for name, nodes in made.wires.items():
-        np.testing.assert_array_equal(found.wires[name], nodes)
+# Gmsh places graded nodes by quadrature, to 1e-8 of a gap of some metres.
+@pytest.mark.parametrize(
+    ("refinement", "grading", "within"), [(1, 1.0, PLACE), (2, 1.0, PLACE), (1, 6.0, 3e-7)]
+)
+def test_a_mesh_without_a_file_is_that_of_the_file(
+    make_line: Callable[..., LineData],
+    tmp_path: Path,
+    refinement: int,
+    grading: float,
+    within: float,
+) -> None:
+    line = line_from(make_line())
+    written, made = (
+        make_mesh(line, 7, path, support_refinement=refinement, grading=grading)
+        for path in (tmp_path / "line.msh", None)
+    )
+    np.testing.assert_allclose(made.points, written.points, rtol=0, atol=within)
+    for name, nodes in written.wires.items():
+        np.testing.assert_array_equal(made.wires[name], nodes)
     for name in ("droppers", "steady_arms", "supports", "anchors", "dropper_group"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(made, name))
+        np.testing.assert_array_equal(getattr(made, name), getattr(written, name))
 
 
 def test_gmsh_opens_the_file_with_its_physical_groups(
@@ -260,33 +273,48 @@ def test_an_impossible_request_is_refused(
     sentence: str,
 ) -> None:
     with pytest.raises(InputError, match=sentence):
-        make_mesh(line_from(make_line()), 3, tmp_path / name)
+        write_mesh(line_from(make_line()), 3, tmp_path / name)
+    assert not gmsh.isInitialized()
 
 
-@pytest.mark.parametrize(
-    ("number", "error", "sentence"),
-    [
-        (errno.ENOSPC, RunBroken, "line.msh cannot be written to its end: free some space"),
-        (errno.EACCES, InputError, "line.msh cannot be written: permission denied"),
-    ],
-)
-def test_a_mesh_that_finds_no_room_leaves_the_earlier_file(
-    make_line: Callable[..., LineData],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    number: int,
-    error: type[Exception],
-    sentence: str,
+def test_gmsh_prints_nothing_and_leaves_the_interrupt_alone(
+    line: Line, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    before = signal.getsignal(signal.SIGINT)
+    write_mesh(line, 3, tmp_path / "line.msh")
+    read_mesh(tmp_path / "line.msh", line)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert not gmsh.isInitialized()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_open_session_of_the_caller_stays_open(
+    make_line: Callable[..., LineData], tmp_path: Path
+) -> None:
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.add("of the caller")
+        write_mesh(line_from(make_line()), 3, tmp_path / "line.msh")
+        assert gmsh.isInitialized()
+        assert gmsh.model.list() == ["", "of the caller"]
+    finally:
+        gmsh.finalize()
+
+
+def test_a_mesh_that_finds_no_room_leaves_the_earlier_file(
+    make_line: Callable[..., LineData], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a full disk Gmsh ends amid the file and says nothing."""
     path = tmp_path / "line.msh"
-    make_mesh(line_from(make_line()), 2, path)
-    earlier = path.read_bytes()
+    write_mesh(line_from(make_line()), 2, path)
+    earlier, write = path.read_bytes(), gmsh.write
 
-    def writes_half(path: Path, *rest: object, **more: object) -> None:
-        path.write_bytes(earlier[: len(earlier) // 2])
-        raise OSError(number, os.strerror(number))
+    def writes_half(name: str) -> None:
+        write(name)
+        os.truncate(name, len(earlier) // 2)
 
-    monkeypatch.setattr(meshio.gmsh, "write", writes_half)
-    with pytest.raises(error, match=sentence):
-        make_mesh(line_from(make_line()), 3, path)
+    monkeypatch.setattr(gmsh, "write", writes_half)
+    with pytest.raises(RunBroken, match="line.msh cannot be written to its end: free some space"):
+        write_mesh(line_from(make_line()), 3, path)
     assert path.read_bytes() == earlier and list(tmp_path.iterdir()) == [path]

@@ -1,9 +1,8 @@
-"""A mesh as a Gmsh file, written, or read as a line mesh. The only file that imports meshio."""
+"""A Gmsh mesh file, ours or a user's own, as a line mesh. The only file that imports meshio."""
 
 from __future__ import annotations
 
 import contextlib
-import errno
 import io
 import os
 import warnings
@@ -12,8 +11,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from catenary.base.errors import InputError, RunBroken
-from catenary.base.files import appears_whole, is_file
+from catenary.base.errors import InputError
+from catenary.base.files import is_file
 from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import ANCHORS, Groups, LineMesh, assemble
 
@@ -22,48 +21,6 @@ MOST_BYTES = 500_000_000
 _HEAD = 65536  # [B], comments may stand first
 _SHOWN, _SOME = 60, 12  # of the names of groups that a file has
 _KINDS = {0: "points", 1: "lines", 2: "surfaces", 3: "volumes"}
-
-
-def write_mesh(groups: Groups, path: Path) -> None:
-    """Write a mesh as a Gmsh file (MSH 2.2, ASCII). Not collective: call it on one rank.
-
-    Parameters
-    ----------
-    groups : Groups
-        Points, and physical groups of lines and points.
-    path : Path
-        File to write, its name ends in ``.msh``.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    RunBroken
-        If the disk is full; an earlier file is as it was.
-    """
-    if path.suffix != ".msh":
-        raise InputError(f"the mesh file {path} must have a name that ends in .msh")
-    members = [(1, "line", *own) for own in groups.lines.items()]
-    members += [(0, "vertex", name, nodes[:, None]) for name, nodes in groups.nodes.items()]
-    tags = [np.full(len(own), tag) for tag, (*_, own) in enumerate(members, start=1)]
-    content = meshio.Mesh(
-        groups.points,
-        [(kind, own) for _, kind, _, own in members if len(own)],
-        cell_data=dict.fromkeys(("gmsh:physical", "gmsh:geometrical"), [t for t in tags if t.size]),
-        # A group without members is named as well: readers refuse a mesh without the name.
-        field_data={own[2]: np.array([tag, own[0]]) for tag, own in enumerate(members, start=1)},
-    )
-    try:
-        with appears_whole(path, ".msh") as part:
-            meshio.gmsh.write(part, content, "2.2", binary=False)
-    except OSError as error:
-        if error.errno == errno.ENOSPC:
-            raise RunBroken(
-                f"the mesh file {path} cannot be written to its end: free some space or choose "
-                "another file"
-            ) from error
-        why = (error.strerror or str(error)).lower()
-        raise InputError(f"the mesh file {path} cannot be written: {why}") from error
 
 
 def read_mesh(path: Path, line: Line) -> LineMesh:
