@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from catenary.base.errors import InputError
-from catenary.meshgen.line import Droppers, Line
+from catenary.meshgen.line import Line
 from catenary.meshgen.mesh import ANCHORS, Groups
 from catenary.meshgen.wires import SAME_PLACE, End
 
@@ -43,7 +43,7 @@ class Cuts:
 
     x: np.ndarray
     is_mast: np.ndarray
-    pieces: tuple[PieceCuts, ...]
+    pieces: tuple[PieceCuts, ...] = ()
 
     def of(self, x: np.ndarray) -> np.ndarray:
         """Numbers of the cuts at positions ``x`` (n,) [m]."""
@@ -55,51 +55,30 @@ def find_cuts(line: Line) -> Cuts:
 
     Wires that are cut at the same places have their nodes beside each other: the matrices then
     join stations along the track to their neighbours only.
-
-    Raises
-    ------
-    InputError
-        If the upper wire of a dropper does not pass above its lower end.
     """
-    masts = line.support_positions
     ends = [x for wire in line.wires for piece in wire.pieces for x in (piece.x[0], piece.x[-1])]
-    places = [masts, np.array(ends)]
-    places += [np.array(x) for group in line.droppers for x in (group.upper_x, group.lower_x)]
-    places += [np.array(group.x) for group in (*line.hardware, *line.clamps)]
-    x = np.concatenate(places)
-    # Sorting is stable: of places that are one, a mast stays.
-    x = x[np.argsort(x, kind="stable")]
-    x = x[np.diff(x, prepend=-np.inf) > SAME_PLACE]
-    is_mast = np.zeros(x.size, dtype=bool)
-    is_mast[np.searchsorted(x, masts - SAME_PLACE)] = True
-    pieces = []
+    hanging = [x for group in line.droppers for x in (group.upper_x, group.lower_x)]
+    placed = [group.x for group in (*line.hardware, *line.clamps)]
+    cuts = cuts_at(line.support_positions, ends, *hanging, *placed)
+    x, pieces = cuts.x, []
     for wire in line.wires:
         for piece in wire.pieces:
             first, last = np.searchsorted(x, np.array([piece.x[0], piece.x[-1]]) - SAME_PLACE)
             points = wire.points(x[first : last + 1])
             held = piece.ends[0] is End.HELD, piece.ends[1] is End.HELD
             pieces.append(PieceCuts(wire.name, int(first), points, held))
-    for group in line.droppers:
-        _check_heights(line, group)
-    return Cuts(x, is_mast, tuple(pieces))
+    return replace(cuts, pieces=tuple(pieces))
 
 
-def _check_heights(line: Line, group: Droppers) -> None:
-    upper, lower = line.wire(group.upper), line.wire(group.lower)
-    x = np.array(group.lower_x)
-    length = upper.points(np.array(group.upper_x))[:, 2] - lower.points(x)[:, 2]
-    short = np.flatnonzero(~(length > 0.0))
-    if short.size:
-        masts = line.support_positions
-        at = x[short[0]]
-        span = int(np.searchsorted(masts, at))
-        over, under = (name.replace("_", " ") for name in (group.upper, group.lower))
-        raise InputError(
-            f"at the dropper at {at - masts[span - 1]:g} m of span {span} the {over} is expected "
-            f"to hang {-length[short[0]]:.3f} m below the {under}: raise the {over} "
-            f"({upper.top - lower.top:g} m above the {under} at the supports) or its tension, or "
-            "lower the rise of the transition spans or of the overlap"
-        )
+def cuts_at(masts: np.ndarray, *places: Sequence[float]) -> Cuts:
+    """Cuts at masts (n,) and other places, each once, without pieces of wires [m]."""
+    x = np.concatenate([masts, *places])
+    # Sorting is stable: of places that are one, a mast stays.
+    x = x[np.argsort(x, kind="stable")]
+    x = x[np.diff(x, prepend=-np.inf) > SAME_PLACE]
+    is_mast = np.zeros(x.size, dtype=bool)
+    is_mast[np.searchsorted(x, masts - SAME_PLACE)] = True
+    return Cuts(x, is_mast)
 
 
 def divisions_of(cuts: Cuts, elements_per_gap: int, support_refinement: int) -> np.ndarray:

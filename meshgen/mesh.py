@@ -338,40 +338,30 @@ def _find_droppers(
 def _ends_of_chains(
     points: np.ndarray, on_wire: np.ndarray, edges: np.ndarray, joins: Droppers, what: str
 ) -> np.ndarray:
-    """Follow chains of elements from wire node to wire node, (n, 2)."""
-    if on_wire[edges].all():
+    """Nodes of wires that chains of elements join, (n, 2)."""
+    on_wires = on_wire[edges].sum(axis=1)
+    if (on_wires == 2).all():
         return np.array(edges, dtype=np.int64)
-    meeting: dict[int, list[int]] = {}
-    for element, pair in enumerate(edges.tolist()):
-        for node in pair:
-            if not on_wire[node]:
-                meeting.setdefault(node, []).append(element)
-    for node, elements in meeting.items():
-        if len(elements) != 2:
-            fault = "ends in the air" if len(elements) == 1 else "branches"
-            raise InputError(
-                f"{what}: a dropper {fault} at {_at(points, node)}, but must join {joins.upper} "
-                f"and {joins.lower}"
-            )
-    found = []
-    visited = np.zeros(edges.shape[0], dtype=bool)
-    for start in range(edges.shape[0]):
-        first, node = edges[start].tolist()
-        if not on_wire[first]:
-            first, node = node, first
-        if visited[start] or not on_wire[first]:
-            continue
-        element = start
-        visited[element] = True
-        while not on_wire[node]:
-            element = sum(meeting[node]) - element  # the other one of the two
-            visited[element] = True
-            node = int(edges[element].sum()) - node
-        found.append((first, node))
-    if not visited.all():
-        loose = edges[np.flatnonzero(~visited)[0], 0]
-        raise InputError(f"{what}: the elements at {_at(points, loose)} join no wire")
-    return np.array(found, dtype=np.int64).reshape(-1, 2)
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    nodes, degree = np.unique(edges[~on_wire[edges]], return_counts=True)
+    wrong = np.flatnonzero(degree != 2)
+    if wrong.size:
+        fault = "ends in the air" if degree[wrong[0]] == 1 else "branches"
+        raise InputError(
+            f"{what}: a dropper {fault} at {_at(points, nodes[wrong[0]])}, but must join "
+            f"{joins.upper} and {joins.lower}"
+        )
+    between, outer = edges[on_wires == 0], edges[on_wires == 1]
+    size, ones = len(points), np.ones(len(between))
+    chain = connected_components(coo_matrix((ones, between.T), (size, size)), directed=False)[1]
+    off, on = np.take_along_axis(outer, np.argsort(on_wire[outer], axis=1), axis=1).T
+    loose = nodes[~np.isin(chain[nodes], chain[off])]
+    if loose.size:
+        raise InputError(f"{what}: the elements at {_at(points, loose[0])} join no wire")
+    ends = on[np.argsort(chain[off], kind="stable")].reshape(-1, 2)
+    return np.concatenate([edges[on_wires == 2], ends])
 
 
 def _check_droppers(points: np.ndarray, ends: np.ndarray, joins: Droppers, what: str) -> None:

@@ -87,11 +87,6 @@ class Piece:
         """The points that it passes, (3, n) [m]."""
         return np.array([self.x, self.y, self.z])
 
-    def points(self, x: np.ndarray) -> np.ndarray:
-        """Points of the piece at positions ``x`` (n,) along the track, shape (n, 3) [m]."""
-        at, y, z = self.course
-        return np.column_stack([x, np.interp(x, at, y), np.interp(x, at, z)])
-
 
 @dataclass(frozen=True)
 class Section:

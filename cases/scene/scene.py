@@ -181,10 +181,14 @@ class Scene(Table):
         named = f"{key} ({meaning})" if meaning else key
         return Fault(key, f"{named} is missing {self._origin.of(of or key)}{end}")
 
-    def needs_effect(self, key: str, effect: str) -> Fault:
-        """The fault of a key that acts only with an effect that is off by default."""
-        why = f"it acts only with effects.{effect} = true; write that, or false to leave it out"
-        return self.refused(key, why)
+    def needs_effect(self, effect: str, *keys: str) -> Iterator[Fault]:
+        """Faults of keys that act only with an effect that is off, unless the scene writes so."""
+        if effect in self.effects or self.switches()[effect]:
+            return
+        why = f"acts only with effects.{effect} = true; write that, or false to leave it out"
+        for key in keys:
+            is_table = isinstance(self._at(key), dict)
+            yield self.fault(key, why) if is_table else self.refused(key, f"it {why}")
 
     def switches(self) -> dict[str, bool]:
         """Every effect of the registry and whether it is on, in the registry's order."""

@@ -20,6 +20,7 @@ from catenary.meshgen.topologies.line_data import (
     ClampedWire,
     Course,
     FreeDroppers,
+    FreeLink,
     FreeWire,
     LineData,
 )
@@ -35,16 +36,25 @@ BRIDLE_WIRE, BRIDLE_CLAMPS = "bridle_wire", "bridle_clamps"
 HUNG = ("contact_wire", "messenger_wire", "dropper")
 
 
-Make = Callable[[LineData], Line]
+class Parts(NamedTuple):
+    """What a line is made of: wires, contact wires first, what joins and carries them, and pairs of
+    like wires side by side, the second one of each before the first one."""
+
+    wires: tuple[FreeWire, ...]
+    links: tuple[FreeLink, ...]
+    twins: tuple[tuple[str, str], ...] = ()
+
+
+Listing = Callable[[LineData], Parts]
 
 
 class Topology(NamedTuple):
-    """A topology: the function that makes its lines, and parts of ``LineData`` that some have.
+    """A topology: the function that lists its wires and links, and parts of ``LineData``.
 
     ``parts`` must be given for this topology, ``may`` may be; further ones must not.
     """
 
-    make: Make
+    list_parts: Listing
     parts: tuple[str, ...]
     may: tuple[str, ...]
 
@@ -54,8 +64,8 @@ _TOPOLOGIES: dict[str, Topology] = {}
 
 def register(
     name: str, parts: tuple[str, ...] = HUNG, may: tuple[str, ...] = ()
-) -> Callable[[Make], Make]:
-    """Decorator that registers a function as the maker of lines of the topology ``name``.
+) -> Callable[[Listing], Listing]:
+    """Decorator that registers a function as the one that lists what the topology ``name`` has.
 
     Parameters
     ----------
@@ -72,11 +82,11 @@ def register(
         If there is a topology of that name.
     """
 
-    def keep(make: Make) -> Make:
+    def keep(list_parts: Listing) -> Listing:
         if name in _TOPOLOGIES:
             raise ValueError(f"topology {name} is registered already")
-        _TOPOLOGIES[name] = Topology(make, parts, may)
-        return make
+        _TOPOLOGIES[name] = Topology(list_parts, parts, may)
+        return list_parts
 
     return keep
 
@@ -99,6 +109,17 @@ def make_line(data: LineData) -> Line:
     InputError
         If there is no such topology, or the data make no line.
     """
+    return _made(listed(data))
+
+
+def listed(data: LineData) -> LineData:
+    """The data with all wires and links of the line listed, as they are of a free line.
+
+    Raises
+    ------
+    InputError
+        If there is no such topology, or it lacks a part.
+    """
     topology = registered().get(data.topology)
     if topology is None:
         known = ", ".join(sorted(registered()))
@@ -106,16 +127,18 @@ def make_line(data: LineData) -> Line:
     for part in topology.parts:
         if getattr(data, part) is None:
             raise InputError(f"the topology {data.topology} needs {part}")
-    return _made(topology, data)
+    return _listed(topology, data)
 
 
+# Checks and runs of a scene ask for them many times.
 @lru_cache(maxsize=16)
-def _made(topology: Topology, data: LineData) -> Line:
-    """The line of a topology: checks and runs of a scene ask for it many times."""
-    data.check()
-    line = topology.make(data)
-    line = line if data.overlaps is None else with_overlaps(line, data.overlaps)
-    return replace(line, curve=data.curve)
+def _listed(topology: Topology, data: LineData) -> LineData:
+    wires, links, twins = topology.list_parts(data)
+    whole = replace(data, wires=wires, links=links, twins=twins)
+    return whole if data.overlaps is None else with_overlaps(whole, data.overlaps)
+
+
+_made = lru_cache(maxsize=16)(line_of)
 
 
 def second(name: str) -> str:
@@ -124,14 +147,14 @@ def second(name: str) -> str:
 
 
 @register(SIMPLE)
-def simple_catenary(data: LineData) -> Line:
+def simple_catenary(data: LineData) -> Parts:
     """A contact wire that droppers hang from a messenger wire straight above the track."""
     wires = _contact(data), _messenger(data)
-    return line_of(data, SIMPLE, wires, (_droppers(data), _arms(data), _supports(data)))
+    return Parts(wires, (_droppers(data), _arms(data), _supports(data)))
 
 
 @register(COMPOUND, (*HUNG, "auxiliary_wire"))
-def compound_catenary(data: LineData) -> Line:
+def compound_catenary(data: LineData) -> Parts:
     """The contact wire hangs from an auxiliary wire, which hangs level from the messenger wire."""
     auxiliary = data.auxiliary_wire
     assert auxiliary is not None
@@ -141,20 +164,15 @@ def compound_catenary(data: LineData) -> Line:
     names = AUXILIARY_DROPPERS, auxiliary.dropper, MESSENGER_WIRE, AUXILIARY_WIRE
     hung = FreeDroppers(*names, x, x, (0.0,) * len(x))
     links = _droppers(data, upper=AUXILIARY_WIRE), hung, _arms(data), _supports(data)
-    return line_of(data, COMPOUND, (_contact(data), level, _messenger(data)), links)
+    return Parts((_contact(data), level, _messenger(data)), links)
 
 
 @register(STITCHED, (*HUNG, "stitch_wire"))
-def stitched_catenary(data: LineData) -> Line:
+def stitched_catenary(data: LineData) -> Parts:
     """A simple catenary with stitch wires clamped to the messenger wire beside inner supports.
 
     Between its clamps a stitch wire carries its tension in place of the messenger wire, and at each
     inner support the nearest droppers hang from it.
-
-    Raises
-    ------
-    InputError
-        If there is no inner support, or stitch wires of neighbouring ones would overlap.
     """
     assert data.stitch_wire is not None
     stitch = _clamped(data, data.stitch_wire, STITCH_WIRE, MESSENGER_WIRE, STITCH_CLAMPS)
@@ -166,20 +184,20 @@ def stitched_catenary(data: LineData) -> Line:
         _arms(data),
         _supports(data),
     )
-    return line_of(data, STITCHED, (_contact(data), stitch, _messenger(data)), links)
+    return Parts((_contact(data), stitch, _messenger(data)), links)
 
 
 @register(TWIN, (*HUNG, "twin"))
-def twin_contact_wires(data: LineData) -> Line:
+def twin_contact_wires(data: LineData) -> Parts:
     """Two contact wires that hang from one messenger wire, each with a steady arm at each mast."""
     pair = CONTACT_WIRE, second(CONTACT_WIRE)
     wires = *_contacts(data), _messenger(data)
     links = *_twin_droppers(data, MESSENGER_WIRE, MESSENGER_WIRE), *_twin_arms(data)
-    return line_of(data, TWIN, wires, (*links, _supports(data)), (pair[::-1],))
+    return Parts(wires, (*links, _supports(data)), (pair[::-1],))
 
 
 @register(TWIN_MESSENGER, (*HUNG, "twin"))
-def twin_simple_catenaries(data: LineData) -> Line:
+def twin_simple_catenaries(data: LineData) -> Parts:
     """Two simple catenaries side by side, which only the pan head joins."""
     pairs = [(name, second(name)) for name in (CONTACT_WIRE, MESSENGER_WIRE)]
     above = [_messenger(data, *own) for own in zip(pairs[1], _sides(data), strict=True)]
@@ -190,39 +208,28 @@ def twin_simple_catenaries(data: LineData) -> Line:
         _supports(data, pairs[1][1], second(SUPPORTS)),
     )
     twins = tuple((other, one) for one, other in pairs)
-    return line_of(data, TWIN_MESSENGER, (*_contacts(data), *above), links, twins)
+    return Parts((*_contacts(data), *above), links, twins)
 
 
 @register(SINGLE, ("contact_wire",), ("bridle",))
-def single_wire(data: LineData) -> Line:
+def single_wire(data: LineData) -> Parts:
     """A contact wire that supports hold at its height at each mast, itself or by a bridle.
 
     Between its clamps a bridle carries its tension in place of the contact wire.
-
-    Raises
-    ------
-    InputError
-        If there is no inner support for bridles, or those of neighbouring ones would overlap.
     """
     bridles = []
     if data.bridle is not None:
         bridles = [_clamped(data, data.bridle, BRIDLE_WIRE, CONTACT_WIRE, BRIDLE_CLAMPS)]
     carried = BRIDLE_WIRE if bridles else CONTACT_WIRE
     links = _arms(data), _supports(data, carried, holds=CONTACT_WIRE)
-    return line_of(data, SINGLE, (_contact(data), *bridles), links)
+    return Parts((_contact(data), *bridles), links)
 
 
 @register(FREE, ("wires", "links"))
-def free_line(data: LineData) -> Line:
-    """The wires and links of a scene's tables.
-
-    Raises
-    ------
-    InputError
-        As ``line_of``.
-    """
+def free_line(data: LineData) -> Parts:
+    """The wires and links of a scene's tables."""
     assert data.wires is not None and data.links is not None
-    return line_of(data, FREE, data.wires, data.links)
+    return Parts(data.wires, data.links)
 
 
 def _wire(
@@ -243,8 +250,8 @@ def _wire(
 
 
 def _contact(data: LineData, name: str = CONTACT_WIRE, sideways: float = 0.0) -> FreeWire:
-    conductor, height = data.contact_wire, data.contact_height
-    return _wire(data, conductor, name, Role.CONTACT, height, sideways)
+    assert data.contact_wire is not None
+    return _wire(data, data.contact_wire, name, Role.CONTACT, data.contact_height, sideways)
 
 
 def _messenger(data: LineData, name: str = MESSENGER_WIRE, sideways: float = 0.0) -> FreeWire:
@@ -255,13 +262,6 @@ def _messenger(data: LineData, name: str = MESSENGER_WIRE, sideways: float = 0.0
 
 def _clamped(data: LineData, wire: ClampedWire, name: str, bearer: str, clamps: str) -> FreeWire:
     """A wire at each inner support that is clamped to another one on both sides of it."""
-    if data.n_spans < 2:
-        raise InputError(f"a line with {name} needs a support between two spans")
-    if wire.length >= min(data.span_lengths):
-        raise InputError(
-            f"pieces of {name} of {wire.length:g} m overlap in a span of "
-            f"{min(data.span_lengths):g} m"
-        )
     return FreeWire(
         wire.conductor,
         name,

@@ -6,7 +6,7 @@ heights.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from typing import TypeVar
@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from catenary.base.errors import InputError
+from catenary.meshgen.geometry import Cuts, cuts_at
 from catenary.meshgen.line import Clamps, Droppers, Line, SteadyArms, Supports
 from catenary.meshgen.topologies.line_data import FreeDroppers, FreeLink, FreeWire, LineData
 from catenary.meshgen.wires import Conductor, End, Piece, Profile, Role, Taken, Wire
@@ -23,30 +24,11 @@ GRAVITY = 9.81
 _Group = TypeVar("_Group", FreeDroppers, Clamps, SteadyArms, Supports)
 
 
-def line_of(
-    data: LineData,
-    topology: str,
-    wires: tuple[FreeWire, ...],
-    links: tuple[FreeLink, ...],
-    twins: tuple[tuple[str, str], ...] = (),
-) -> Line:
-    """The line of some wires and links. Contact wires come first, the others as listed.
+def line_of(data: LineData) -> Line:
+    """The line of listed wires and links. Contact wires come first, the others as listed.
 
     A contact wire, a wire that droppers hang, and one that supports or arms are to hold at its
     height have that height at rest; the others hang between what carries them.
-
-    Parameters
-    ----------
-    data : LineData
-        Masts, and the rise of transition spans.
-    topology : str
-        Name of the topology.
-    wires : tuple of FreeWire
-        Wires of the line, contact wires first.
-    links : tuple of FreeLink
-        Groups of droppers, clamps, steady arms and supports.
-    twins : tuple of tuple, optional
-        Pairs of names of wires, as of a ``Line``.
 
     Raises
     ------
@@ -54,26 +36,27 @@ def line_of(
         If there is no contact wire, or wires are clamped to each other or hang from each other in a
         circle.
     """
-    data = replace(data, wires=wires, links=links)
+    wires, links = data.wires, data.links
+    assert wires is not None and links is not None
     by_name = {wire.name: wire for wire in wires}
     if not any(wire.role is Role.CONTACT for wire in wires):
         raise InputError("no wire of the line has the role contact")
-    droppers = _of_kind(links, FreeDroppers)
-    loads = _loads(data, wires, droppers)
+    hanging = _hanging(data)
     made: dict[str, Wire] = {}
     for name in in_order((one.name, one.bearers) for one in wires):
-        made[name] = _wire(data, by_name[name], made, loads[name])
+        made[name] = _wire(data, by_name[name], made, hanging[name])
     listed = sorted((made[name] for name in by_name), key=lambda one: one.role is not Role.CONTACT)
     return Line(
         data.span_lengths,
         data.n_transition,
-        topology,
+        data.topology,
         tuple(replace(wire, taken=_taken(wire.name, wires)) for wire in listed),
-        tuple(_plain(group) for group in droppers),
+        tuple(_plain(group) for group in _of_kind(links, FreeDroppers)),
         _of_kind(links, SteadyArms),
         _of_kind(links, Supports),
         (*_of_kind(links, Clamps), *_end_clamps(wires)),
-        twins=twins,
+        curve=data.curve,
+        twins=data.twins,
     )
 
 
@@ -122,6 +105,19 @@ def carriers(data: LineData, wire: FreeWire) -> np.ndarray:
     return np.unique(places)
 
 
+def cuts_of(data: LineData) -> Cuts:
+    """Places at which the wires are cut: masts, ends of wires, and links."""
+    assert data.wires is not None and data.links is not None
+    ends = [x for wire in data.wires for stretch in wire.stretches for x in stretch]
+    hanging, placed = [], []
+    for link in data.links:
+        if isinstance(link, FreeDroppers):
+            hanging += [link.upper_x, link.lower_x]
+        else:
+            placed.append(link.x)
+    return cuts_at(data.support_positions, ends, *hanging, *placed)
+
+
 def _of_kind(links: tuple[FreeLink, ...], kind: type[_Group]) -> tuple[_Group, ...]:
     return tuple(link for link in links if isinstance(link, kind))
 
@@ -156,123 +152,69 @@ def _taken(name: str, wires: tuple[FreeWire, ...]) -> tuple[Taken, ...]:
     return tuple(sorted(taken))
 
 
-def _loads(
-    data: LineData, wires: tuple[FreeWire, ...], droppers: tuple[FreeDroppers, ...]
-) -> dict[str, Loads]:
-    """Expected loads that hang from each wire: of wires below by their droppers, of clamped ones at
-    their ends. For first guesses only."""
-    by_name = {wire.name: wire for wire in wires}
-    loads = {wire.name: Loads() for wire in wires}
-    below: dict[str, list[str]] = {wire.name: [] for wire in wires}
-    for group in droppers:
-        below[group.upper].append(group.lower)
-    for wire in wires:
-        for bearer in wire.bearers:
-            if by_name[bearer].role is not Role.CONTACT:
-                below[bearer].append(wire.name)
-    for name in in_order(below.items()):
-        own, wire = loads[name], by_name[name]
-        holding = [group for group in droppers if group.lower == name]
-        at = carriers(data, wire)
-        carried = own.shared(at, wire)
-        for group in holding:
-            loads[group.upper].add(group.upper_x, carried[np.searchsorted(at, group.lower_x)])
-        for end, bearer in enumerate(wire.clamped_to):
-            if bearer and not holding and by_name[bearer].role is not Role.CONTACT:
-                ends = np.array(wire.stretches)
-                whole = wire.conductor.mass_per_length * np.diff(ends) + np.diff(own.before(ends))
-                loads[bearer].add(ends[:, end], 0.5 * whole[:, 0])
-    return loads
+def _hanging(data: LineData) -> dict[str, np.ndarray]:
+    """Places [m] and masses [kg], (2, n), that are expected to hang from each wire: of wires below
+    by their droppers, of clamped ones at their ends. For first guesses only.
 
-
-class Loads:
-    """Masses that hang from a wire at places along the line."""
-
-    def __init__(self) -> None:
-        self._parts: list[tuple[np.ndarray, np.ndarray]] = []
-
-    def add(self, x: Sequence[float] | np.ndarray, mass: Sequence[float] | np.ndarray) -> None:
-        """Further masses [kg] at places ``x`` [m]."""
-        self._parts.append((np.asarray(x, dtype=float), np.asarray(mass, dtype=float)))
-
-    @property
-    def sorted(self) -> tuple[np.ndarray, np.ndarray]:
-        """Places, ascending, and masses there."""
-        x = np.concatenate([np.zeros(0), *(part[0] for part in self._parts)])
-        mass = np.concatenate([np.zeros(0), *(part[1] for part in self._parts)])
-        order = np.argsort(x, kind="stable")
-        return x[order], mass[order]
-
-    @property
-    def x(self) -> np.ndarray:
-        """Places, ascending [m]."""
-        return self.sorted[0]
-
-    def before(self, x: np.ndarray) -> np.ndarray:
-        """Mass of all that hangs before places ``x``, shape as ``x`` [kg]."""
-        at, mass = self.sorted
-        return np.asarray(np.concatenate([[0.0], np.cumsum(mass)])[np.searchsorted(at, x)])
-
-    def shared(self, carriers: np.ndarray, wire: FreeWire) -> np.ndarray:
-        """Masses (n,) that a wire's ``carriers``, at ascending places (n,) [m], carry [kg].
-
-        Each carries the wire, and the masses that hang from it, half-way to either neighbour.
-        """
-        ends = wire.stretches[0][0], wire.stretches[-1][1]
-        between = 0.5 * (carriers[1:] + carriers[:-1])
-        bounds = np.concatenate([ends[:1], between, ends[1:]])
-        own = wire.conductor.mass_per_length * np.diff(bounds)
-        return np.asarray(own + np.diff(self.before(bounds)))
-
-
-def sag_between(x: np.ndarray, held: np.ndarray, loads: Loads, wire: Conductor) -> np.ndarray:
-    """Sag of a string below the straight line between neighbouring places ``held`` (m,).
-
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        Places between the first and the last of ``held`` [m].
-    held : ndarray, shape (m,)
-        Places at which the string is held, ascending [m].
-    loads : Loads
-        Loads per length and single loads.
-    wire : Conductor
-        Conductor, whose tension counts.
+    What carries a wire has half of it, and of what hangs from it, up to either neighbour.
     """
-    at, mass = loads.sorted
-    inside = (at > held[0]) & (at < held[-1])
-    at, mass = at[inside], mass[inside]
+    assert data.wires is not None and data.links is not None
+    by_name = {wire.name: wire for wire in data.wires}
+    joints = [
+        (group.lower, group.upper, group.lower_x, group.upper_x)
+        for group in _of_kind(data.links, FreeDroppers)
+    ]
+    for wire in data.wires:
+        for x, bearer in zip(zip(*wire.stretches, strict=True), wire.clamped_to, strict=True):
+            if bearer and by_name[bearer].role is not Role.CONTACT:
+                joints.append((wire.name, bearer, x, x))
+    below: dict[str, list[str]] = {wire.name: [] for wire in data.wires}
+    found = {wire.name: np.zeros((2, 0)) for wire in data.wires}
+    for lower, upper, _, _ in joints:
+        below[upper].append(lower)
+    for name in in_order(below.items()):
+        wire, (x, mass) = by_name[name], found[name]
+        at, ends = carriers(data, wire), np.array(wire.stretches)
+        passed = np.repeat(np.cumsum([0.0, *np.diff(ends)[:, 0]]), 2)[1:-1]
+        bounds = np.concatenate([ends[0, :1], 0.5 * (at[1:] + at[:-1]), ends[-1, 1:]])
+        own = wire.conductor.mass_per_length * np.diff(np.interp(bounds, ends.ravel(), passed))
+        carried = own + np.histogram(x, bounds, weights=mass)[0]
+        for lower, upper, low, high in joints:
+            if lower == name:
+                more = np.array([high, carried[np.searchsorted(at, low)]])
+                found[upper] = np.concatenate([found[upper], more], axis=1)
+    return found
+
+
+def _sag(x: np.ndarray, held: np.ndarray, hanging: np.ndarray, wire: Conductor) -> np.ndarray:
+    """Sag (n,) of a string at places ``x`` (n,) below straight lines between places ``held`` (m,),
+    ascending; ``hanging`` (2, k) are places and masses of what hangs from it."""
+    at, mass = hanging[:, np.argsort(hanging[0])]
+    sums = np.cumsum(np.pad([mass, mass * at], ((0, 0), (1, 0))), axis=1)
+
+    def moment(x: np.ndarray) -> np.ndarray:
+        masses, levers = sums[:, np.searchsorted(at, x)]
+        return np.asarray(masses * x - levers)
+
     gap = np.clip(np.searchsorted(held, x, side="right") - 1, 0, held.size - 2)
-    of_load = np.searchsorted(held, at, side="right") - 1
-    length = np.diff(held)
-    # Moments as of a beam on two supports: reaction on the left, own weight, loads passed.
-    lever = mass * (held[of_load + 1] - at) / length[of_load]
-    reaction = 0.5 * wire.mass_per_length * length
-    reaction += np.bincount(of_load, lever, minlength=length.size)
-    along = x - held[gap]
-    levers = at - held[of_load]
-    sums = [np.concatenate([[0.0], np.cumsum(part)]) for part in (mass, mass * levers)]
-    first, passed = np.searchsorted(at, held[gap]), np.searchsorted(at, x)
-    masses, moments = (part[passed] - part[first] for part in sums)
-    moment = reaction[gap] * along - 0.5 * wire.mass_per_length * along**2
-    sag = GRAVITY * (moment - masses * along + moments) / wire.tension
-    return np.where(np.isin(x, held), 0.0, sag)
+    own = 0.5 * wire.mass_per_length * (x - held[gap]) * (held[gap + 1] - x)
+    return GRAVITY * (own + np.interp(x, held, moment(held)) - moment(x)) / wire.tension
 
 
-def _wire(data: LineData, free: FreeWire, made: dict[str, Wire], loads: Loads) -> Wire:
+def _wire(data: LineData, free: FreeWire, made: dict[str, Wire], hanging: np.ndarray) -> Wire:
     """A wire with its pieces; the wires that it is clamped to are ``made``."""
     profile = _profile(data, free) if free.name in hung(data) else None
     held, ends = carriers(data, free), np.array(free.stretches).reshape(-1, 2)
     clamps = [made[name] if name else None for name in free.clamped_to]
     courses = [np.array(own.x) for own in (free.heights, free.lateral) if own is not None]
-    hanging = [] if profile is not None else [held, loads.x]
-    x = np.unique(np.concatenate([data.support_positions, ends.ravel(), *courses, *hanging]))
+    between = [] if profile is not None else [held, hanging[0]]
+    x = np.unique(np.concatenate([data.support_positions, ends.ravel(), *courses, *between]))
     y = free.lateral.at(x) if free.lateral is not None else _beside(x, ends, clamps)
     if profile is not None:
         z = profile.level(x)
     else:
         z = _straight(free, x, ends, clamps)
-        z -= 0.0 if free.drawn else sag_between(x, held, loads, free.conductor)
+        z -= 0.0 if free.drawn else _sag(x, held, hanging, free.conductor)
     kinds = [End.CLAMPED if clamp else End.HELD for clamp in clamps]
     pieces = []
     for first, last in np.searchsorted(x, ends):
@@ -319,6 +261,6 @@ def _profile(data: LineData, free: FreeWire) -> Profile:
         height,
         tuple(x[order].tolist()),
         tuple(sag[order].tolist()),
-        (data.whole(data.transition_rise),),
+        free.sections or data.sections,
         *course,
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from catenary.base.errors import InputError
 from catenary.meshgen.line import (
     Clamps,
     Curve,
@@ -19,7 +19,7 @@ from catenary.meshgen.line import (
     SteadyArms,
     Supports,
 )
-from catenary.meshgen.wires import Conductor, Role, Section
+from catenary.meshgen.wires import SAME_PLACE, Conductor, Role, Section
 
 # Two cuts of a wire closer than this are taken for a slip of the pen [m]: a millimetre, less the
 # round-off of places up to 1000 km along the track.
@@ -53,6 +53,7 @@ class FreeWire:
     tensioned : whether held ends have a tensioner; None as at the ends of the line
     clamp_mass, clamp_stiffness : of each of its clamps [kg], [N/m]
     clamps : name of the group of these clamps; empty for its own name with ``_clamps``
+    sections : in which it runs, if it is hung; empty for those of the line
     """
 
     conductor: Conductor
@@ -67,10 +68,13 @@ class FreeWire:
     clamp_mass: float = 0.0
     clamp_stiffness: float = 1e7
     clamps: str = ""
+    sections: tuple[Section, ...] = ()
 
-    def passes(self, x: float, close: float = 1e-6) -> bool:
-        """Whether it has a piece at a place [m]."""
-        return any(start - close <= x <= end + close for start, end in self.stretches)
+    def passes(self, x: np.ndarray, close: float = SAME_PLACE) -> np.ndarray:
+        """Whether it has a piece at places ``x``, or as ``close``, bool, shape as ``x`` [m]."""
+        starts, ends = np.array(self.stretches).T
+        which = np.clip(np.searchsorted(starts, x + close, side="right") - 1, 0, None)
+        return np.asarray((starts[which] - close <= x) & (x <= ends[which] + close))
 
     @property
     def bearers(self) -> tuple[str, ...]:
@@ -144,12 +148,6 @@ class Overlaps:
     rise: float
     distance: float
 
-    def sections(self, masts: np.ndarray) -> np.ndarray:
-        """Start and end of each tension section, (k, 2) [m], of a line with ``masts`` (n,) [m]."""
-        first = np.array(self.first, dtype=np.int64)
-        starts = np.append(masts[0], masts[first])
-        return np.column_stack([starts, np.append(masts[first + self.n_spans], masts[-1])])
-
 
 @dataclass(frozen=True)
 class LineData(Spans):
@@ -162,7 +160,7 @@ class LineData(Spans):
     stagger : (n_spans + 1,) lateral position of the contact wire at each support [m]
     contact_height : height of the contact wire at the supports of the running spans [m]
     encumbrance : height of the messenger wire above ``contact_height`` at the supports [m]
-    contact_wire, messenger_wire : conductors, None for the latter if there is none
+    contact_wire, messenger_wire : conductors, None of a free line or if there is none
     dropper : kind of the contact wire's droppers
     support_stiffness : vertical stiffness of the topmost wire's support at a mast [N/m]
     steady_arm : the arms at the inner supports
@@ -173,7 +171,8 @@ class LineData(Spans):
         if it stays above the middle of the track
     curve : of the track, None if it is straight
     overlaps : where the next tension section begins, None if there is only one
-    wires, links : of a free line, None of others
+    wires, links : of a free line; of others None, until the topology has listed them
+    twins : pairs of like wires side by side: the second one of each, and the first one
     """
 
     dropper_positions: tuple[tuple[float, ...], ...]
@@ -181,7 +180,7 @@ class LineData(Spans):
     stagger: tuple[float, ...]
     contact_height: float
     encumbrance: float
-    contact_wire: Conductor
+    contact_wire: Conductor | None
     messenger_wire: Conductor | None
     dropper: DropperKind | None
     support_stiffness: float
@@ -197,6 +196,7 @@ class LineData(Spans):
     curve: Curve | None = None
     wires: tuple[FreeWire, ...] | None = None
     links: tuple[FreeLink, ...] | None = None
+    twins: tuple[tuple[str, str], ...] = ()
 
     @cached_property
     def dropper_x(self) -> np.ndarray:
@@ -214,87 +214,41 @@ class LineData(Spans):
         half = 0.5 * length
         return np.add.outer(self.support_positions[1:-1], (-half, half))
 
-    def whole(self, rise: float) -> Section:
-        """The line from anchor to anchor, with a ``rise`` over the transition spans [m]."""
-        masts = self.support_positions
-        return Section((float(masts[0]), float(masts[-1])), self.running_range, (rise, rise))
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Tension sections. Wires rise to their ends over transition spans, and in an overlap from
+        its middle on."""
+        masts, (first, last) = self.support_positions.tolist(), self.running_range
+        begins, ends, middles, rises = [masts[0]], [], [first], [self.transition_rise]
+        for begin in () if self.overlaps is None else self.overlaps.first:
+            assert self.overlaps is not None
+            begins.append(masts[begin])
+            ends.append(masts[begin + self.overlaps.n_spans])
+            middles.append(0.5 * (begins[-1] + ends[-1]))
+            rises.append(self.overlaps.rise)
+        stretches = zip(begins, [*ends, masts[-1]], strict=True)
+        level = pairwise([*middles, last])
+        return tuple(map(Section, stretches, level, pairwise([*rises, self.transition_rise])))
 
     @property
-    def lowest_contact(self) -> float:
-        """Height at which a contact wire is to hang at its lowest [m]."""
-        if self.wires is None or self.links is None:
-            return self.contact_height - max(max(sags, default=0.0) for sags in self.pre_sag)
-        contact = [wire for wire in self.wires if wire.role is Role.CONTACT]
+    def contact_heights(self) -> tuple[float, float]:
+        """Heights at which contact wires are to hang at their lowest and at their highest [m]."""
+        contact = [wire for wire in self.wires or () if wire.role is Role.CONTACT]
         names = [wire.name for wire in contact]
-        hanging = [link for link in self.links if isinstance(link, FreeDroppers)]
-        sags = [max(link.pre_sag) for link in hanging if link.lower in names]
-        heights = [min(wire.heights.value) for wire in contact if wire.heights is not None]
-        return min(heights) - max(sags, default=0.0)
+        hanging = [link for link in self.links or () if isinstance(link, FreeDroppers)]
+        sags = [max(link.pre_sag, default=0.0) for link in hanging if link.lower in names]
+        heights = [z for wire in contact if wire.heights is not None for z in wire.heights.value]
+        return min(heights) - max(sags, default=0.0), max(heights)
 
     def contact_sideways(self, x: np.ndarray) -> list[np.ndarray]:
         """Lateral positions of each contact wire at places ``x``, shape as ``x`` [m].
 
-        Those of a free line; of others the stagger, which wires are near to.
+        Zero where another tension section carries the strips.
         """
-        if self.wires is None:
-            return [np.interp(x, self.support_positions, self.stagger)]
-        contact = (wire for wire in self.wires if wire.role is Role.CONTACT)
-        return [wire.lateral.at(x) for wire in contact if wire.lateral is not None]
-
-    def check(self) -> None:
-        """Refuse lists of wrong length and droppers outside their spans.
-
-        Raises
-        ------
-        InputError
-            If lists do not fit the number of spans, a dropper is not inside its span, or droppers
-            are not in order.
-        """
-        if self.n_spans == 0:
-            raise InputError("the line has no span: span_lengths must name at least one length")
-        for name, n, wanted in (
-            ("dropper_positions", len(self.dropper_positions), self.n_spans),
-            ("pre_sag", len(self.pre_sag), self.n_spans),
-            ("stagger", len(self.stagger), self.n_spans + 1),
-        ):
-            if n != wanted:
-                raise InputError(f"{name} has {n} entries, but {self.n_spans} spans need {wanted}")
-        if self.messenger_stagger is not None and len(self.messenger_stagger) != self.n_spans + 1:
-            raise InputError(
-                f"messenger_stagger has {len(self.messenger_stagger)} entries, but {self.n_spans} "
-                f"spans need {self.n_spans + 1}"
-            )
-        if self.auxiliary_wire is not None:
-            above = self.auxiliary_wire.dropper_positions
-            for span, (length, places) in enumerate(
-                zip(self.span_lengths, above, strict=True), start=1
-            ):
-                _check_span(span, length, places)
-        spans = zip(self.span_lengths, self.dropper_positions, self.pre_sag, strict=True)
-        for span, (length, places, lowered) in enumerate(spans, start=1):
-            if len(places) != len(lowered):
-                raise InputError(
-                    f"span {span} has {len(places)} droppers, but pre_sag names {len(lowered)} "
-                    "values"
-                )
-            _check_span(span, length, places)
-
-
-def _check_span(span: int, length: float, places: tuple[float, ...]) -> None:
-    if not length > SHORTEST_GAP:
-        raise InputError(f"the length of span {span} is {length:g} m, but must be positive")
-    for place in places:
-        if not SHORTEST_GAP <= place <= length - SHORTEST_GAP:
-            where = (
-                "on a mast" if min(abs(place), abs(place - length)) < SHORTEST_GAP else "outside"
-            )
-            raise InputError(
-                f"the dropper at {place:g} m of span {span} lies {where}, but must lie "
-                f"between the masts, which stand at 0 and {length:g} m"
-            )
-    for left, right in zip(places[:-1], places[1:], strict=True):
-        if right - left < SHORTEST_GAP:
-            raise InputError(
-                f"the droppers at {left:.10g} and {right:.10g} m of span {span} are not in "
-                f"ascending order at least {SHORTEST_GAP:g} m apart"
-            )
+        found = []
+        for wire in self.wires or ():
+            if wire.role is Role.CONTACT and wire.lateral is not None:
+                level = [own.running for own in wire.sections] or [(-np.inf, np.inf)]
+                here = np.any([(low <= x) & (x <= high) for low, high in level], axis=0)
+                found.append(np.where(here, wire.lateral.at(x), 0.0))
+        return found

@@ -79,7 +79,7 @@ def _wire(line: Line, wire: Wire) -> dict[str, Any]:
             "clamp_stiffness_N_per_m": clamps.stiffness,
         }
         return table
-    y = first.points(line.support_positions)[:, 1]
+    y = wire.points(line.support_positions)[:, 1]
     height = wire.profile.height if wire.profile is not None else first.z[0]
     return {**table, "height_m": height, "stagger_m": y.tolist()}
 

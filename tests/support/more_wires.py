@@ -8,16 +8,23 @@ from dataclasses import replace
 
 from small_lines import en50318_line
 
-from catenary.meshgen.line import DropperKind, Line
+from catenary.meshgen.line import DropperKind
 from catenary.meshgen.topologies.all_topologies import (
     AUXILIARY_WIRE,
     STITCH_WIRE,
+    Parts,
     register,
     simple_catenary,
     unregister,
 )
-from catenary.meshgen.topologies.line_data import AuxiliaryWire, ClampedWire, LineData
-from catenary.meshgen.wires import Conductor, Piece, Role, Wire
+from catenary.meshgen.topologies.line_data import (
+    AuxiliaryWire,
+    ClampedWire,
+    Course,
+    FreeWire,
+    LineData,
+)
+from catenary.meshgen.wires import Conductor, Role
 
 AUXILIARY, STITCH = AUXILIARY_WIRE, STITCH_WIRE
 STITCH_HALF = 9.0  # [m]
@@ -25,14 +32,14 @@ TOPOLOGIES = ("compound", "stitched")
 FEEDER = "feeder"
 
 
-def with_feeder(data: LineData) -> Line:
+def with_feeder(data: LineData) -> Parts:
     """A simple catenary with a wire above it that nothing joins: what a newcomer writes."""
     simple = simple_catenary(data)
-    ends = tuple(simple.support_positions[[0, -1]].tolist())
+    ends = float(data.support_positions[0]), float(data.support_positions[-1])
     top = data.contact_height + data.encumbrance + 1.0
-    course = Piece(ends, (0.0, 0.0), (top, top))
-    feeder = Wire.of(Conductor(5e3, 1.1, 50.0), FEEDER, Role.MESSENGER, (course,))
-    return replace(simple, topology="with_feeder", wires=(*simple.wires, feeder))
+    level, middle = Course(ends, (top, top)), Course(ends, (0.0, 0.0))
+    feeder = FreeWire(Conductor(5e3, 1.1, 50.0), FEEDER, Role.MESSENGER, (ends,), level, middle)
+    return simple._replace(wires=(*simple.wires, feeder))
 
 
 @contextmanager

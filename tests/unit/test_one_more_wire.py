@@ -1,6 +1,6 @@
 """Wires beyond the simple catenary: an auxiliary wire, stitch wires, and one of a newcomer.
 
-What a newcomer writes is a function from `LineData` to a `Line`, as the one in `more_wires`; mesh,
+What a newcomer writes is a function from `LineData` to `Parts`, as the one in `more_wires`; mesh,
 form finding, elasticity, march and incidents take any wires by name.
 """
 

@@ -44,7 +44,11 @@ REFUSED = {
                            "no dropper would hang from it: the nearest one is 5 m"),
     "clamp on a dropper": (RE330, ["line.stitch_wire.length_m=10"],
                            "its clamp at 60 m of the line would stand on a dropper"),
-    "one span": (RE330, ["line.n_spans=1"], "a stitched line needs a support, that is two spans"),
+    "one span": (RE330, ["line.n_spans=1"], "a line with stitch wires needs a support, that is"),
+    "one span with bridles": (
+        TRAM, [f"line.bridle={BRIDLE}", "line.n_spans=1", "train.start_m=1", "evaluation.from_m=2",
+               "evaluation.to_m=20", "train.raise_time_s=0"],
+        "n_spans is 1 .* a line with bridles needs a support, that is two spans"),
     "strong stitch wires": (RE330, ["line.stitch_wire.tension_N=21000"],
                             "it must be less than line.messenger_wire.tension_N .21000 N"),
     "stitch wires in kN": (RE330, ["line.stitch_wire.tension_N=3.5"], "is it 3.5 kN. write 3500"),
@@ -100,7 +104,11 @@ REFUSED = {
     "overlap that rises too far": (OVERLAP, ["line.overlap.rise_m=1.1"], "below the contact wire"),
     "overlap under a messenger wire that is near": (
         COMPOUND, ["line.overlap.first_span=12", "line.overlap.rise_m=1.0"],
-        r"below the auxiliary wire: raise the messenger wire \(1.1 m above the auxiliary wire at "),
+        "encumbrance_m is .* m below the auxiliary wire in span .* or lower the rise of the trans"),
+    "strips too short for the wires of an overlap": (
+        OVERLAP, ["pantographs.three_masses.strips.length_m=0.7",
+                  "train.pantographs=[{name='three_masses',behind_m=0.0}]"],
+        "at 770 m the wire is 0.4 m beside the strips' middle .* at least 0.8 m long"),
     "long bridle": (TRAM, [f"line.bridle={BRIDLE}", "line.bridle.length_m=30"],
                     "it must be less than the shortest span .30 m."),
     "strong bridle": (TRAM, [f"line.bridle={BRIDLE}", "line.bridle.tension_N=10000"],

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 
 from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.keys.table import take_away
-from catenary.cases.scene.line.hardware import FEWEST_SAGGING
-from catenary.cases.scene.line.line_data import arm_tables, dropper_tables
+from catenary.cases.scene.line.hardware import FEWEST_SAGGING, DropperTable, SteadyArmTable
+from catenary.cases.scene.line.line_data import tables_of
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.meshgen.line import Line
 from catenary.meshgen.topologies.all_topologies import make_line
@@ -97,15 +97,15 @@ def check_effect_data(scene: Scene) -> Iterator[Fault]:
     """Effects without the value that they need, and values without their effect."""
     # A line has one ratio for all droppers, as another check sees to.
     name, on = _RESIDUAL, scene.switches()[_RESIDUAL]
-    key, hung = next(iter(dropper_tables(scene.line).items()), ("", None))
+    key, hung = next(iter(tables_of(scene.line, DropperTable).items()), ("", None))
     if hung is None:
         if on:
             yield scene.refused(f"effects.{name}", "the line has no droppers")
     elif on and not hung.residual_stiffness_ratio:
         why = f"effects.{name} is on and needs a value greater than 0"
         yield scene.refused(f"{key}.residual_stiffness_ratio", why)
-    elif hung.residual_stiffness_ratio and not on and name not in scene.effects:
-        yield scene.needs_effect(f"{key}.residual_stiffness_ratio", name)
+    elif hung.residual_stiffness_ratio:
+        yield from scene.needs_effect(name, f"{key}.residual_stiffness_ratio")
     n = len(scene.train.pantographs)
     if n > 1 and scene.holds(Limit.ONE_PANTOGRAPH):
         key = "effects.several_pantographs"
@@ -131,7 +131,7 @@ def check_idle(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _idle_arms(scene: Scene) -> Iterator[Fault]:
-    for key, arm in arm_tables(scene.line).items():
+    for key, arm in tables_of(scene.line, SteadyArmTable).items():
         if arm.mass_kg_per_m and not arm.length_m and scene.effects.get("arm_inertia") is not False:
             why = f"an arm of length 0 has no mass by it: give {key}.length_m, or clamp_kg alone"
             yield scene.refused(f"{key}.mass_kg_per_m", why + take_away())
@@ -211,7 +211,7 @@ def _dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 def _sagging(scene: Scene) -> Iterator[Fault]:
     """A sag at mid-span of droppers between a first and a last one, where there are none."""
-    for key, table in dropper_tables(scene.line).items():
+    for key, table in tables_of(scene.line, DropperTable).items():
         if table.count is not None:
             most = table.count
         else:

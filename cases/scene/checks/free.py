@@ -26,10 +26,9 @@ from catenary.cases.scene.line.wires import (
     FreeWireTable,
 )
 from catenary.cases.scene.scene import Scene
-from catenary.meshgen.geometry import Cuts, divisions_of
 from catenary.meshgen.line import Clamps, mast_places
 from catenary.meshgen.mesh import ANCHORS
-from catenary.meshgen.topologies.free import carriers, hung, in_order
+from catenary.meshgen.topologies.free import carriers, cuts_of, hung, in_order
 from catenary.meshgen.topologies.line_data import (
     SHORTEST_GAP,
     FreeDroppers,
@@ -341,39 +340,6 @@ def check_free_places(scene: Scene, line: LineData) -> Iterator[Fault]:
     yield from found
 
 
-def places_of(line: LineData) -> np.ndarray:
-    """All places at which wires are cut, ascending, each once [m]."""
-    assert line.wires is not None and line.links is not None
-    parts = [line.support_positions]
-    parts += [np.array(wire.stretches).ravel() for wire in line.wires]
-    parts += [np.array(_places(link)) for link in line.links]
-    x = np.concatenate(parts)
-    x = x[np.argsort(x, kind="stable")]
-    return x[np.diff(x, prepend=-np.inf) > SAME_PLACE]
-
-
-def free_counts(scene: Scene) -> tuple[int, dict[str, int]]:
-    """Numbers of droppers, and of nodes of each wire, of a free line.
-
-    Raises
-    ------
-    InputError
-        If droppers are not declared for one of the span lengths.
-    """
-    line = scene.line_data
-    assert line.wires is not None and line.links is not None
-    x = places_of(line)
-    cuts = Cuts(x, np.isin(x, line.support_positions), ())
-    gaps = divisions_of(cuts, scene.mesh.elements_per_gap, scene.mesh.support_refinement)
-    before = np.concatenate([[0], np.cumsum(gaps)])
-    nodes = {}
-    for wire in line.wires:
-        ends = cuts.of(np.array(wire.stretches))
-        nodes[wire.name] = int((np.diff(before[ends], axis=1) + 1).sum())
-    droppers = sum(len(link.lower_x) for link in line.links if isinstance(link, FreeDroppers))
-    return droppers, nodes
-
-
 def _places(link: FreeLink) -> tuple[float, ...]:
     return link.lower_x if isinstance(link, FreeDroppers) else link.x
 
@@ -384,11 +350,12 @@ def _on_wires(
     pair = isinstance(link, FreeDroppers | Clamps)
     for end in ("upper", "lower") if pair else ("wire",):
         wire = wires[getattr(link, end)]
-        out = next((x for x in _places(link) if not wire.passes(x)), None)
-        if out is not None:
+        places = np.array(_places(link))
+        out = places[~wire.passes(places)]
+        if out.size:
             runs = ", ".join(f"{start:g} to {stop:g}" for start, stop in wire.stretches[:3])
             more = " and so on" if len(wire.stretches) > 3 else ""
-            why = f"{wire.name} does not pass {out:g} m, only {runs} m{more}"
+            why = f"{wire.name} does not pass {out[0]:g} m, only {runs} m{more}"
             yield scene.refused(f"{key}.{end}", why)
 
 
@@ -396,8 +363,9 @@ def _clamped_on(
     scene: Scene, key: str, wire: FreeWire, wires: dict[str, FreeWire]
 ) -> Iterator[Fault]:
     for end, name in enumerate(wire.clamped_to):
-        out = [] if not name else [s[end] for s in wire.stretches if not wires[name].passes(s[end])]
-        if out:
+        at = np.array([stretch[end] for stretch in wire.stretches if name])
+        out = at[~wires[name].passes(at)] if name else at
+        if out.size:
             why = f"{name} does not pass {out[0]:g} m, where this wire would be clamped to it"
             yield scene.refused(f"{key}.{('start', 'end')[end]}", why)
 
@@ -410,7 +378,7 @@ def _heights(scene: Scene, key: str, wire: FreeWire, line: LineData) -> Iterator
 
 def _close(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Cuts that are too close to each other to be meant."""
-    x = places_of(line)
+    x = cuts_of(line).x
     close = np.flatnonzero(np.diff(x) < SHORTEST_GAP)
     if close.size:
         one, other = x[close[0]], x[close[0] + 1]

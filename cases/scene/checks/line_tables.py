@@ -14,21 +14,25 @@ import numpy as np
 from catenary.cases.scene.checks.free import check_free_places, check_free_tables, droppers_inside
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.keys.table import take_away
+from catenary.cases.scene.line.hardware import SteadyArmTable
 from catenary.cases.scene.line.imperfections import WrongTensionTable
 from catenary.cases.scene.line.line import LineTable
 from catenary.cases.scene.line.line_data import (
     TENSIONER,
     along_of,
-    arm_tables,
     numbered,
-    wire_tables,
+    tables_of,
 )
-from catenary.cases.scene.line.wires import FreeWireTable
+from catenary.cases.scene.line.wires import FreeWireTable, WireTable
 from catenary.cases.scene.run.incidents import DropperBreakTable, TensionLossTable
 from catenary.cases.scene.scene import Scene
-from catenary.meshgen.geometry import find_cuts
 from catenary.meshgen.topologies.all_topologies import FREE, make_line, registered
-from catenary.meshgen.topologies.line_data import SHORTEST_GAP, FreeDroppers, LineData
+from catenary.meshgen.topologies.line_data import (
+    SHORTEST_GAP,
+    ClampedWire,
+    FreeDroppers,
+    LineData,
+)
 from catenary.meshgen.wires import SAME_PLACE, End, Wire
 from catenary.solver.problem.ends import AlongTrack
 from catenary.solver.problem.problem import Problem
@@ -78,9 +82,12 @@ def check_parts(scene: Scene, line: LineData) -> Iterator[Fault]:
     if line.wires is not None:
         yield from check_free_places(scene, line)
         return
-    yield from _stitch_wire(scene, line)
+    if line.stitch_wire is not None:
+        yield from _clamped(scene, line, "stitch_wire", line.stitch_wire, "messenger_wire")
+        yield from _stitch_wire(scene, line, line.stitch_wire.length)
+    if line.bridle is not None:
+        yield from _clamped(scene, line, "bridle", line.bridle, "contact_wire")
     yield from _auxiliary_wire(scene, line)
-    yield from _bridle(scene, line)
     yield from _overlap(scene, line)
 
 
@@ -96,56 +103,44 @@ def check_names(scene: Scene, line: LineData) -> Iterator[Fault]:
                 yield from scene.among(f"{where}.{i}.wire", wires, "the line has")
 
 
-def _stitch_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
-    stitch, messenger = line.stitch_wire, line.messenger_wire
-    if stitch is None or messenger is None:
-        return
-    key, tension = "line.stitch_wire.length_m", stitch.conductor.tension
+def _clamped(
+    scene: Scene, line: LineData, part: str, wire: ClampedWire, bearer: str
+) -> Iterator[Fault]:
+    """Wires clamped to another one at supports that are none, overlap, or take all its tension."""
+    shortest, whole = min(line.span_lengths), getattr(line, bearer).tension
     if line.n_spans < 2:
-        yield scene.refused("line.n_spans", "a stitched line needs a support, that is two spans")
+        why = f"a line with {part.replace('_', ' ')}s needs a support, that is two spans"
+        yield scene.refused("line.n_spans", why)
+    if wire.length >= shortest:
+        why = f"it must be less than the shortest span ({shortest:g} m)"
+        yield scene.refused(f"line.{part}.length_m", why)
+    if wire.conductor.tension >= whole:
+        yield scene.refused(
+            f"line.{part}.tension_N",
+            f"it must be less than line.{bearer}.tension_N ({whole:g} N), of which it "
+            "takes its part between the clamps",
+        )
+
+
+def _stitch_wire(scene: Scene, line: LineData, length: float) -> Iterator[Fault]:
+    """Clamps on droppers, and stitch wires from which none hangs."""
+    if line.n_spans < 2:
         return
-    yield from _too_long(scene, line, key, stitch.length)
-    clamps = line.around_supports(stitch.length).ravel()
+    clamps = line.around_supports(length).ravel()
     apart = _to_nearest(clamps, line.dropper_x)
     if apart.min() < SHORTEST_GAP:
         why = f"its clamp at {clamps[apart.argmin()]:g} m of the line would stand on a dropper"
-        yield scene.refused(key, why)
+        yield scene.refused("line.stitch_wire.length_m", why)
     nearest = _to_nearest(line.support_positions[1:-1], line.dropper_x).min()
-    if nearest > 0.5 * stitch.length:
+    if nearest > 0.5 * length:
         why = f"no dropper would hang from it: the nearest one is {nearest:g} m from a support"
-        yield scene.refused(key, why)
-    yield from _takes_all(scene, "stitch_wire", tension, "messenger_wire", messenger.tension)
+        yield scene.refused("line.stitch_wire.length_m", why)
 
 
 def _to_nearest(x: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Distances (n,) of places ``x`` (n,) from the nearest of others, ascending (m,) [m]."""
     behind = np.clip(np.searchsorted(places, x), 1, places.size - 1)
     return np.minimum(abs(x - places[behind - 1]), abs(places[behind] - x))
-
-
-def _bridle(scene: Scene, line: LineData) -> Iterator[Fault]:
-    if line.bridle is not None:
-        yield from _too_long(scene, line, "line.bridle.length_m", line.bridle.length)
-        tensions = line.bridle.conductor.tension, line.contact_wire.tension
-        yield from _takes_all(scene, "bridle", tensions[0], "contact_wire", tensions[1])
-
-
-def _too_long(scene: Scene, line: LineData, key: str, length: float) -> Iterator[Fault]:
-    shortest = min(line.span_lengths)
-    if length >= shortest:
-        yield scene.refused(key, f"it must be less than the shortest span ({shortest:g} m)")
-
-
-def _takes_all(
-    scene: Scene, wire: str, tension: float, bearer: str, whole: float
-) -> Iterator[Fault]:
-    """A wire between clamps that would take all tension of the one that it is clamped to."""
-    if tension >= whole:
-        yield scene.refused(
-            f"line.{wire}.tension_N",
-            f"it must be less than line.{bearer}.tension_N ({whole:g} N), of which it takes its "
-            "part between the clamps",
-        )
 
 
 def _auxiliary_wire(scene: Scene, line: LineData) -> Iterator[Fault]:
@@ -196,32 +191,31 @@ def check_droppers_inside_spans(scene: Scene, line: LineData) -> Iterator[Fault]
 
 
 def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
-    """Droppers whose upper wire is expected to hang below the lower one."""
-    made = make_line(line)
+    """The first group with droppers whose upper wire is expected to hang below the lower one."""
+    made, rises = make_line(line), scene.line.transition.rise_m or line.overlaps is not None
     for number, group in enumerate(made.droppers):
         x = np.array(group.lower_x)
-        upper, lower = (made.wire(name).points(x)[:, 2] for name in (group.upper, group.lower))
-        worst = int(np.argmin(upper - lower)) if x.size else 0
-        if x.size == 0 or upper[worst] > lower[worst]:
+        lower = made.wire(group.lower).points(x)[:, 2]
+        below = lower - made.wire(group.upper).points(np.array(group.upper_x))[:, 2]
+        if not (below >= 0.0).any():
             continue
-        below = lower[worst] - upper[worst]
-        if line.links is not None:
-            links = [i for i, own in enumerate(line.links) if isinstance(own, FreeDroppers)]
+        worst = int(np.argmax(below > below.max() - SAME_PLACE))  # the first of like ones
+        if line.topology == FREE:
+            links = [i for i, own in enumerate(line.links or ()) if isinstance(own, FreeDroppers)]
             why = (
-                f"at {x[worst]:g} m it is expected {below:.3f} m below "
+                f"at {x[worst]:g} m it is expected {below[worst]:.3f} m below "
                 f"{group.lower}, which hangs from it: raise its height_m or its tension_N, or let "
                 "the other wire hang lower"
             )
             yield scene.refused(f"line.links.{links[number]}.upper", why)
-        elif line.overlaps is not None:
-            find_cuts(made)  # says so
         else:
             over, under = (name.replace("_", " ") for name in (group.upper, group.lower))
             why = (
-                f"the {over} would hang {below:.2f} m below the {under} in span "
+                f"the {over} would hang {below[worst]:.2f} m below the {under} in span "
                 f"{np.searchsorted(line.support_positions, x[worst])}: raise it, raise "
                 "line.messenger_wire.tension_N or shorten the span"
             )
+            why += ", or lower the rise of the transition spans or of the overlap" if rises else ""
             yield scene.refused("line.encumbrance_m", why)
         return
 
@@ -229,27 +223,21 @@ def check_dropper_lengths(scene: Scene, line: LineData) -> Iterator[Fault]:
 def check_lateral(scene: Scene) -> Iterator[Fault]:
     """Keys of lateral motion without it."""
     line = scene.line
-    if scene.switches()[_ACROSS]:
-        return
     given = {
         "line.messenger_stagger_m": line.messenger_stagger_m,
         "line.curve.radius_m": line.curve,
         "line.damping.lateral": line.damping.lateral,
     }
-    for key, arm in arm_tables(line).items():
+    for key, arm in tables_of(line, SteadyArmTable).items():
         for name in ("inclination_deg", "registration_stiffness_N_per_m"):
             given[f"{key}.{name}"] = getattr(arm, name)
-    for key, value in given.items():
-        if value is not None and _ACROSS not in scene.effects:
-            yield scene.needs_effect(key, _ACROSS)
+    yield from scene.needs_effect(_ACROSS, *(key for key in given if given[key] is not None))
 
 
 def check_along(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Data that motion along the track lacks, and data that only it has a use for."""
     on = scene.switches()[_ALONG]
-    if not on and _ALONG not in scene.effects:
-        for key in _data_of_effect(scene):
-            yield scene.needs_effect(key, _ALONG)
+    yield from scene.needs_effect(_ALONG, *_data_of_effect(scene))
     yield from _mid_points(scene, line)
     yield from _weights(scene, line)
     if not scene.origin.recorded:
@@ -307,7 +295,7 @@ def _idle_tensioners(scene: Scene) -> Iterator[Fault]:
 
 
 def _without_stiffness(scene: Scene) -> Iterator[Fault]:
-    for key, wire in wire_tables(scene.line).items():
+    for key, wire in tables_of(scene.line, WireTable).items():
         if wire.stiffness_along() is None:
             field = LineTable.model_fields.get(key.removeprefix("line."))
             what = wire.name if isinstance(wire, FreeWireTable) else field and field.description
@@ -321,7 +309,10 @@ def _without_stiffness(scene: Scene) -> Iterator[Fault]:
 def _without_length(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Arms without a length, along which nothing could swing."""
     made = make_line(line)
-    keys = {getattr(table, "name", ""): key for key, table in arm_tables(scene.line).items()}
+    keys = {
+        getattr(table, "name", ""): key
+        for key, table in tables_of(scene.line, SteadyArmTable).items()
+    }
     for arms in made.steady_arms:
         if arms.kind.length == 0 and made.wire(arms.wire).radial_force(np.array(arms.x)).any():
             yield scene.refused(
@@ -334,10 +325,7 @@ def _without_length(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 def _loose_sections(scene: Scene, line: LineData) -> Iterator[Fault]:
     """Sections with a tensioner at both ends and nothing in between that holds their wires."""
-    along, masts, overlaps = along_of(scene.line), line.support_positions, line.overlaps
-    sections = [[0.0, float(masts[-1])]]
-    if overlaps is not None:
-        sections = overlaps.sections(masts).tolist()
+    along, sections = along_of(scene.line), [section.ends for section in line.sections]
     between = len(sections) - 1
     tensioned = [along.start, *[along.overlap] * between, along.end]
     keys = [*["line.overlap.along"] * between, "line.ends.end.along"]

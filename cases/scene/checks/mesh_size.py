@@ -6,23 +6,21 @@ the start and of a run from numbers of nodes, unknowns and steps.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from catenary.base.errors import InputError
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION
-from catenary.cases.scene.checks.free import free_counts
 from catenary.cases.scene.input.faults import Fault
 from catenary.cases.scene.line.line import LineTable
-from catenary.cases.scene.line.line_data import free_wires, overlaps_of, span_lengths
 from catenary.cases.scene.line.wires import FreeDroppersTable
-from catenary.cases.scene.scene import Scene, line_of
-from catenary.meshgen.geometry import divisions_of, find_cuts
+from catenary.cases.scene.scene import Scene
+from catenary.meshgen.geometry import divisions_of
+from catenary.meshgen.topologies.all_topologies import listed
+from catenary.meshgen.topologies.free import cuts_of
+from catenary.meshgen.topologies.line_data import FreeDroppers
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.effect import NamedWire
 
 # 20 000 spans of ten gaps with ten elements each; their run takes some 7 GB.
 MOST_NODES = 4_000_000
@@ -57,55 +55,32 @@ class Size(NamedTuple):
 
 
 def size_of(scene: Scene) -> Size | None:
-    """The size of the mesh that a scene's line will have; None if it brings its own, or if its line
-    cannot be made, which other checks report. Its wires are cut, and not divided."""
+    """The size of the mesh that a scene's line will have; None if it brings its own.
+
+    Its wires and links must fit together; they are cut, and not divided.
+    """
     if scene.mesh.file is not None:
         return None
-    if scene.line.wires is not None:
-        return _of_free_line(scene)
-    overlaps = overlaps_of(scene.line)
-    if overlaps is not None and max(overlaps.first) + overlaps.n_spans >= scene.line.n_spans:
-        return None
-    try:
-        if droppers_of(scene) > MOST_DROPPERS:
-            return None
-        line = line_of(scene)
-        cuts = find_cuts(line)
-    except InputError:
-        return None
+    line = listed(scene.line_data)
+    assert line.wires is not None
+    cuts = cuts_of(line)
     gaps = divisions_of(cuts, scene.mesh.elements_per_gap, scene.mesh.support_refinement)
     before = np.concatenate([[0], np.cumsum(gaps)])
-    nodes = dict.fromkeys((wire.name for wire in line.wires), 0)
-    for piece in cuts.pieces:
-        last = piece.first + len(piece.points) - 1
-        nodes[piece.wire] += int(before[last] - before[piece.first]) + 1
-    together = () if scene.switches()[RELATIVE_MOTION] else {one for one, _ in line.twins}
-    own = [wire for wire in line.wires if wire.name not in together]
-    return _size(scene, line.dropper_x.size, nodes, own)
-
-
-def _of_free_line(scene: Scene) -> Size | None:
-    """The size of a line whose wires are listed, counted without making it."""
-    try:
-        n_droppers, nodes = free_counts(scene)
-        listed = free_wires(scene.line, span_lengths(scene.line)) or ()
-    except InputError:
-        return None
-    return _size(scene, n_droppers, nodes, listed)
-
-
-def _size(scene: Scene, n_droppers: int, nodes: dict[str, int], wires: Sequence[NamedWire]) -> Size:
-    """The size of a line with nodes of wires by name, of which ``wires`` have unknowns."""
+    stretches = {wire.name: cuts.of(np.array(wire.stretches)) for wire in line.wires}
+    nodes = {name: int((np.diff(before[at]) + 1).sum()) for name, at in stretches.items()}
     switches = scene.switches()
+    together = () if switches[RELATIVE_MOTION] else {one for one, _ in line.twins}
+    moving = [wire for wire in line.wires if wire.name not in together]
     chosen = (effect for name, effect in effects.registry().items() if switches[name])
-    groups = effects.unknown_groups(chosen, wires)
+    groups = effects.unknown_groups(chosen, moving)
     unknowns = sum(nodes[wire] * len(own) for group in groups for wire, own in group.items())
     n_spans, irregular = scene.line.n_spans, scene.irregularities
-    kinds = max(len(set(span_lengths(scene.line))), kinds_by_number(scene.line))
+    kinds = max(len(set(line.span_lengths)), kinds_by_number(scene.line))
     if irregular.contact_wire_height is not None or irregular.dropper_lengths is not None:
         kinds = n_spans
     by_pieces = scene.window.mode == "bounded" and scene.window.tolerance is None
-    return Size(n_spans, n_droppers, sum(nodes.values()), unknowns, kinds, by_pieces)
+    droppers = sum(len(link.lower_x) for link in line.links or () if isinstance(link, FreeDroppers))
+    return Size(n_spans, droppers, sum(nodes.values()), unknowns, kinds, by_pieces)
 
 
 def kinds_by_number(table: LineTable) -> int:
@@ -116,27 +91,17 @@ def kinds_by_number(table: LineTable) -> int:
     return len(patterns) if any(pattern.spans for pattern in patterns) else 0
 
 
-def droppers_of(scene: Scene) -> int:
-    """Number of droppers of a scene's line, whose wires are not made.
-
-    Raises
-    ------
-    InputError
-        If they are not declared for one of the span lengths.
-    """
-    data = scene.line_data
-    auxiliary = () if data.auxiliary_wire is None else data.auxiliary_wire.dropper_positions
-    return sum(map(len, (*data.dropper_positions, *auxiliary)))
-
-
 def size_faults(scene: Scene) -> Iterator[Fault]:
     """A fault if there are more than ``MOST_DROPPERS``, or if the mesh has more than
     ``MOST_NODES``."""
+    data = scene.line_data
+    above = () if data.auxiliary_wire is None else data.auxiliary_wire.dropper_positions
+    n = sum(map(len, (*data.dropper_positions, *above)))
+    if n > MOST_DROPPERS:
+        why = f"its spans have {n} droppers, and at most {MOST_DROPPERS} are allowed"
+        yield scene.refused("line.n_spans", why)
+        return
     size = size_of(scene)
-    with suppress(InputError):  # which other checks report
-        if size is None and (n := droppers_of(scene)) > MOST_DROPPERS:
-            why = f"its spans have {n} droppers, and at most {MOST_DROPPERS} are allowed"
-            yield scene.refused("line.n_spans", why)
     if size is not None and size.nodes > MOST_NODES:
         key = "line.n_spans"
         yield Fault(

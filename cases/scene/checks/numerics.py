@@ -22,7 +22,6 @@ def check_contact(scene: Scene) -> Iterator[Fault]:
 def _damping(scene: Scene) -> Iterator[Fault]:
     contact, switches = scene.contact, scene.switches()
     law, on = contact.law, switches["contact_damping"]
-    is_given = "contact_damping" in scene.effects
     if law == "linear":
         key, value, dissipates = "damping_N_s_per_m", contact.damping_N_s_per_m, "greater than 0"
         acts = value > 0
@@ -40,8 +39,8 @@ def _damping(scene: Scene) -> Iterator[Fault]:
     key = f"contact.{key}"
     if on and not acts:
         yield scene.refused(key, f"effects.contact_damping is on and needs a value {dissipates}")
-    if acts and not on and not is_given:
-        yield scene.needs_effect(key, "contact_damping")
+    if acts:
+        yield from scene.needs_effect("contact_damping", key)
 
 
 def _loss(scene: Scene) -> Iterator[Fault]:

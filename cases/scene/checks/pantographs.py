@@ -18,7 +18,8 @@ from catenary.base.errors import InputError, RunBroken
 from catenary.cases.scene.input.faults import Fault, shown
 from catenary.cases.scene.keys.table import StretchTable, take_away
 from catenary.cases.scene.keys.units import speed_from_km_h
-from catenary.cases.scene.line.line_data import wire_tables
+from catenary.cases.scene.line.line_data import tables_of
+from catenary.cases.scene.line.wires import WireTable
 from catenary.cases.scene.run.wind import wind_of
 from catenary.cases.scene.scene import Scene, end_of, pantograph_of, static_force, strips_ahead
 from catenary.cases.scene.train.mechanism import ActuatorTable
@@ -78,18 +79,17 @@ def _kinds(scene: Scene) -> dict[str, PantographTable]:
 
 
 def _out_of_reach(scene: Scene, line: LineData) -> Iterator[Fault]:
-    lowest = line.lowest_contact
-    heights = lowest, line.contact_height
+    lowest, highest = line.contact_heights
     for name, table in _kinds(scene).items():
         if not isinstance(table, MultibodyTable) or table.nominal_height_m is None:
             continue
         data, standing = _standing(scene, name, table)
-        for height in heights:
+        for height in (lowest, highest):
             if _reaches(data, standing.working_height + height - table.nominal_height_m):
                 continue
             yield scene.refused(
                 f"pantographs.{name}.nominal_height_m",
-                f"the contact wire hangs at {lowest:.4g} to {line.contact_height:.4g} m, where its "
+                f"the contact wire hangs at {lowest:.4g} to {highest:.4g} m, where its "
                 f"head would be {height - table.nominal_height_m:+.4g} m away from there, beyond "
                 "the reach of its mechanism",
             )
@@ -101,8 +101,8 @@ def reaches_below(scene: Scene, name: str, line: LineData, drop: float) -> bool:
     table = scene.pantographs[name]
     if not isinstance(table, MultibodyTable):
         return True
-    lowest = line.lowest_contact
-    nominal = line.contact_height if table.nominal_height_m is None else table.nominal_height_m
+    lowest, highest = line.contact_heights
+    nominal = highest if table.nominal_height_m is None else table.nominal_height_m
     data, standing = _standing(scene, name, table)
     return _reaches(data, standing.working_height + lowest - nominal - drop - _LEADS)
 
@@ -239,12 +239,10 @@ def check_vehicle(scene: Scene, line: LineData) -> Iterator[Fault]:
 
 
 def _vehicle_acts(scene: Scene) -> Iterator[Fault]:
-    on, is_given = scene.switches()["vehicle_motion"], "vehicle_motion" in scene.effects
     if scene.vehicle is None:
         return
-    if not on and not is_given:
-        yield _idle(scene, "vehicle", "vehicle_motion")
-    if on and not _wire_moves_along_strips(scene):
+    yield from scene.needs_effect("vehicle_motion", "vehicle")
+    if scene.switches()["vehicle_motion"] and not _wire_moves_along_strips(scene):
         suspension = scene.vehicle.suspension
         sways = suspension is not None and suspension.lateral is not None
         for key, is_there in (
@@ -268,21 +266,15 @@ def _wire_moves_along_strips(scene: Scene) -> bool:
 
 
 def _roll_acts(scene: Scene) -> Iterator[Fault]:
-    on, is_given = scene.switches()["head_roll"], "head_roll" in scene.effects
+    on = scene.switches()["head_roll"]
     for name, kind in _kinds(scene).items():
-        if not on and isinstance(kind, LumpedTable) and kind.roll is not None and not is_given:
-            yield _idle(scene, f"pantographs.{name}.roll", "head_roll")
+        if isinstance(kind, LumpedTable) and kind.roll is not None:
+            yield from scene.needs_effect("head_roll", f"pantographs.{name}.roll")
         rolls = on and pantograph_of(name, kind, scene.train.speed_km_h).roll
         if rolls and kind.strips.length_m is None:
             strip = f"pantographs.{name}.strips.length_m"
             why = f"it needs {strip}, the strip that the wire moves along"
             yield scene.refused("effects.head_roll", why)
-
-
-def _idle(scene: Scene, key: str, effect: str) -> Fault:
-    return scene.fault(
-        key, f"acts only with effects.{effect} = true; write that, or false to leave it out"
-    )
 
 
 def _multibody_strips(scene: Scene) -> Iterator[Fault]:
@@ -396,7 +388,7 @@ def check_wind(scene: Scene, line: LineData) -> Iterator[Fault]:
     if table is None:
         return
     if scene.switches()["wind"] and table.speed_m_per_s > 0.0:
-        for name, wire in wire_tables(scene.line).items():
+        for name, wire in tables_of(scene.line, WireTable).items():
             if wire.diameter_mm is None:
                 why = "the drag of the wind depends on it; give it, or write effects.wind = false"
                 yield scene.missing(f"{name}.diameter_mm", "", why, of=name)

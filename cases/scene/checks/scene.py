@@ -28,8 +28,9 @@ from catenary.cases.scene.keys.units import USUAL, unit_guess, unit_of
 from catenary.cases.scene.run.case import chosen_books
 from catenary.cases.scene.scene import Scene, end_of, strips_ahead
 from catenary.meshgen.slowest_wave import bends, slowest_wave
-from catenary.meshgen.topologies.all_topologies import make_line
+from catenary.meshgen.topologies.all_topologies import listed, make_line
 from catenary.meshgen.topologies.line_data import LineData
+from catenary.meshgen.wires import Role
 from catenary.postproc.files.header import in_sentence, places_on_train
 from catenary.postproc.record.snapshots.contents import OTHER_PARTS
 from catenary.postproc.standards.rule_books import (
@@ -65,14 +66,12 @@ def faults_of(scene: Scene) -> list[Fault]:
     if found.collect(_pantograph_names, scene):
         found.collect(pantographs.check_pantographs, scene)
         found.collect(pantographs.check_laws, scene)
-    # A scene that is too large is not made; consequences of a wrong unit are not reported.
-    sound = not whole or found.collect(mesh_size.size_faults, scene)
-    sound = sound and found.collect(usual_faults, scene)
-    line = _line(scene, found) if sound and whole else None
-    if line is None:
+    # Consequences of a wrong unit are not reported; a scene that is too large is not made.
+    usual = found.collect(usual_faults, scene)
+    line = _line(scene, found) if usual and whole else None
+    if line is None or not found.collect(mesh_size.size_faults, scene):
         return found.faults
-    if not found.collect(line_tables.check_parts, scene, line):
-        return found.faults
+    line = listed(line)
     if not found.collect(line_tables.check_names, scene, line):
         return found.faults
     of_lines = (
@@ -127,7 +126,7 @@ class _Findings:
 
 
 def _line(scene: Scene, found: _Findings) -> LineData | None:
-    """The line of a scene, None if its droppers do not fit into its spans."""
+    """The line of a scene, None if its parts do not fit together."""
     try:
         line = scene.line_data
     except InputError as error:
@@ -135,7 +134,7 @@ def _line(scene: Scene, found: _Findings) -> LineData | None:
         return None
     checks = line_tables.check_droppers_inside_spans, free.check_free_droppers
     inside = [found.collect(of_line, scene, line) for of_line in checks]
-    return line if all(inside) else None
+    return line if all(inside) and found.collect(line_tables.check_parts, scene, line) else None
 
 
 def _test_keys(scene: Scene) -> Iterator[Fault]:
@@ -179,10 +178,11 @@ def _speed(scene: Scene, line: LineData) -> Iterator[Fault]:
     speed = scene.train.speed_km_h
     if not scene.holds(Limit.WAVE_SPEED):
         return
-    wave = slowest_wave(make_line(line))
+    made = make_line(line)
+    wave = slowest_wave(made)
     if speed < 3.6 * wave:
         return
-    wire = line.contact_wire
+    wire = min(made.wires_of(Role.CONTACT), key=lambda one: one.wave_speed)
     of = f"tension_N = {wire.tension:g} and mass_kg_per_m = {wire.mass_per_length:g}"
     if bends(wave, wire.tension, wire.mass_per_length):
         of = f"bending_stiffness_N_m2 = {wire.bending_stiffness:g}, {of} between its supports"

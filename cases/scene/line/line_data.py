@@ -12,7 +12,6 @@ from catenary.cases.scene.keys.units import length_from_mm
 from catenary.cases.scene.line.hardware import (
     DropperTable,
     Hung,
-    SteadyArmTable,
     dropper_kind,
     hung_in,
     steady_arm,
@@ -25,7 +24,6 @@ from catenary.cases.scene.line.wires import (
     FreeDroppersTable,
     FreeSupportsTable,
     FreeWireTable,
-    WireTable,
     clamped_wire_of,
     conductor,
 )
@@ -40,7 +38,7 @@ from catenary.meshgen.topologies.line_data import (
     Overlaps,
     Twin,
 )
-from catenary.meshgen.wires import SAME_PLACE, Conductor, Role
+from catenary.meshgen.wires import SAME_PLACE, Role
 from catenary.solver.problem.ends import AlongTrack, Tensioner
 
 
@@ -56,7 +54,6 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
     hung = table.dropper
     wires = free_wires(table, spans)
     links = free_links(table, origin, spans, wires)
-    contact_height, contact_wire, stagger = _contact_of(table, wires)
     droppers = [Hung((), ())] * table.n_spans
     if hung is not None:
         droppers = list(hung_in(origin, "line.dropper", hung, numbered(spans)).values())
@@ -66,14 +63,14 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
         span_lengths=spans,
         dropper_positions=tuple(own.positions for own in droppers),
         pre_sag=tuple(pre_sag),
-        stagger=stagger,
+        stagger=staggered(table.stagger_m, table.n_spans),
         messenger_stagger=_optional(
             lambda own: staggered(own, table.n_spans), table.messenger_stagger_m
         ),
         curve=_optional(curve_of, table.curve),
-        contact_height=contact_height,
+        contact_height=table.contact_height_m,
         encumbrance=table.encumbrance_m or 0.0,
-        contact_wire=contact_wire,
+        contact_wire=_optional(conductor, table.contact_wire),
         messenger_wire=_optional(conductor, table.messenger_wire),
         dropper=None if hung is None else dropper_kind(hung, hung.contact_clamp_kg),
         support_stiffness=table.support.stiffness_N_per_m,
@@ -89,27 +86,6 @@ def line_data(table: LineTable, origin: Origin) -> LineData:
         wires=wires,
         links=links,
     )
-
-
-def _contact_of(
-    table: LineTable, wires: tuple[FreeWire, ...] | None
-) -> tuple[float, Conductor, tuple[float, ...]]:
-    """Height, conductor and stagger of the contact wire; of several the one with the slowest waves.
-
-    ValueError if there is none, which checks report.
-    """
-    stagger = staggered(table.stagger_m, table.n_spans)
-    if table.contact_wire is not None:
-        return table.contact_height_m, conductor(table.contact_wire), stagger
-    contact = [wire for wire in wires or () if wire.role is Role.CONTACT]
-    if not contact:
-        raise ValueError("the line has no contact wire")
-    slowest = min(contact, key=lambda wire: wire.conductor.wave_speed)
-    assert slowest.heights is not None
-    if slowest.lateral is not None:
-        supports = mast_places(span_lengths(table))
-        stagger = tuple(slowest.lateral.at(supports).tolist())
-    return max(slowest.heights.value), slowest.conductor, stagger
 
 
 _Table = TypeVar("_Table")
@@ -291,8 +267,8 @@ def _places(
         return tuple(table.at_m)
     if table.supports is not None:
         return tuple(masts[table.supports].tolist())
-    inner = masts[1:-1].tolist()
-    return tuple(x for x in inner if wire is not None and wire.passes(x, -SAME_PLACE))
+    inner = masts[1:-1]
+    return () if wire is None else tuple(inner[wire.passes(inner, -SAME_PLACE)].tolist())
 
 
 def _droppers(
@@ -351,30 +327,16 @@ def along_of(table: LineTable) -> AlongTrack:
 
 def hanging_table(table: LineTable) -> DropperTable | None:
     """The table that says what slack droppers do; of a free line that of its first droppers."""
-    return next(iter(dropper_tables(table).values()), None)
+    return next(iter(tables_of(table, DropperTable).values()), None)
 
 
-def wire_tables(table: LineTable) -> dict[str, WireTable]:
-    """Tables of all wires of a line by their keys."""
+def tables_of(table: LineTable, kind: type[_Table]) -> dict[str, _Table]:
+    """Tables of a kind, such as all of wires, by their keys; of a free line those in its lists."""
     own = {f"line.{name}": getattr(table, name) for name in LineTable.model_fields}
-    own |= {f"line.wires.{i}": wire for i, wire in enumerate(table.wires or [])}
-    return {key: wire for key, wire in own.items() if isinstance(wire, WireTable)}
-
-
-def arm_tables(table: LineTable) -> dict[str, SteadyArmTable]:
-    """Tables of all steady arms of a line by their keys."""
-    if table.links is None:
-        return {"line.steady_arm": table.steady_arm}
-    links = enumerate(table.links)
-    return {f"line.links.{i}": link for i, link in links if isinstance(link, FreeArmsTable)}
-
-
-def dropper_tables(table: LineTable) -> dict[str, DropperTable]:
-    """Tables of all droppers that give pre-sag by their keys."""
-    if table.dropper is not None:
-        return {"line.dropper": table.dropper}
-    links = enumerate(table.links or [])
-    return {f"line.links.{i}": link for i, link in links if isinstance(link, FreeDroppersTable)}
+    if table.wires is not None or table.links is not None:
+        lists = {"line.wires": table.wires, "line.links": table.links}
+        own = {f"{key}.{i}": one for key, ones in lists.items() for i, one in enumerate(ones or [])}
+    return {key: one for key, one in own.items() if isinstance(one, kind)}
 
 
 def staggered(given: list[float], n_spans: int) -> tuple[float, ...]:

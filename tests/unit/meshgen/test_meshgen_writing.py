@@ -260,39 +260,6 @@ def test_a_single_span_has_no_supports_and_is_read_back(make_line: Callable[...,
 
 
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
-        ({"dropper_positions": ((0.0,), (5.0,))}, "the dropper at 0 m of span 1 lies on a mast"),
-        ({"dropper_positions": ((5.0,), (50.0,))}, "the dropper at 50 m of span 2 lies on a mast"),
-        ({"dropper_positions": ((5.0,), (61.0,))}, "the dropper at 61 m of span 2 lies outside"),
-        ({"dropper_positions": ((-4.0,), (5.0,))}, "the dropper at -4 m of span 1 lies outside"),
-        ({"dropper_positions": ((float("nan"),), (5.0,))}, "the dropper at nan m of span 1"),
-        (
-            {"dropper_positions": ((9.0, 5.0), (5.0,)), "pre_sag": ((0.0, 0.0), (0.0,))},
-            "the droppers at 9 and 5 m of span 1 are not in ascending order",
-        ),
-        ({"pre_sag": ((0.0,), ())}, "span 2 has 1 droppers, but pre_sag names 0 values"),
-        ({"stagger": (0.0, 0.2)}, "stagger has 2 entries, but 2 spans need 3"),
-        ({"span_lengths": (50.0, 0.0)}, "the length of span 2 is 0 m"),
-        ({"encumbrance": 0.1, "n_transition": (0, 0)}, "at the dropper at 5 m of span 1"),
-    ],
-)
-def test_an_impossible_line_is_refused(
-    make_line: Callable[..., LineData], tmp_path: Path, changes: dict[str, object], sentence: str
-) -> None:
-    two_spans: dict[str, object] = {
-        "span_lengths": (50.0, 50.0),
-        "dropper_positions": ((5.0,), (5.0,)),
-        "pre_sag": ((0.0,), (0.0,)),
-        "stagger": (0.0, 0.2, 0.0),
-    }
-    path = tmp_path / "line.msh"
-    with pytest.raises(InputError, match=sentence):
-        write_mesh(line_from(make_line(**{**two_spans, **changes})), 3, path)
-    assert not path.exists()
-
-
-@pytest.mark.parametrize(
     ("name", "sentence"),
     [
         ("line.vtk", "must have a name that ends in .msh"),
