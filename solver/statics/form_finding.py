@@ -23,7 +23,7 @@ from catenary.meshgen.line import Line, SteadyArms
 from catenary.meshgen.mesh import LineMesh, reduced, with_nodes_at
 from catenary.meshgen.wires import SAME_PLACE, Wire
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import build
+from catenary.solver.effects.build_model import build, rebuilt
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium, LateralShape
 from catenary.solver.problem.problem import Problem
@@ -183,7 +183,7 @@ def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
     problem = model.problem
     if not (effects.needs_form(problem) or effects.move_together(problem) or model.droppers_bend):
         return model, form
-    return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
+    return rebuilt(model, form=form), form
 
 
 def _with_lateral(model: Model, form: Equilibrium, moments: np.ndarray | None) -> Equilibrium:

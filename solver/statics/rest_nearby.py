@@ -23,7 +23,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import build
+from catenary.solver.effects.build_model import build, rebuilt
 from catenary.solver.model.axial_motion import WireEnd, tensioned_ends
 from catenary.solver.model.link_directions import dropper_directions
 from catenary.solver.model.matrices import stiffness_matrix
@@ -266,13 +266,8 @@ class RestNearby:
             about = replace(model, constrained=constrained) if self._follow.ends.size else model
             if self._bends:
                 shape = replace(form, dropper_force=carried)
-                about = build(
-                    self._follow.held(model.problem),
-                    model.mesh,
-                    model.dropper_lengths,
-                    model.broken,
-                    shape,
-                    cut_lengths=model.cut_lengths,
+                about = rebuilt(
+                    model, problem=self._follow.held(model.problem), form=shape, gap=None
                 )
                 about.constrained = constrained
             step = self._solved(about, self._softening(about, form, slack), lacks)
@@ -362,9 +357,8 @@ def hang(
             f"{mesh.x(mesh.droppers[number, 1]):g} m a length of {length[number]:.3f} m: "
             "take smaller errors"
         )
-    wanted = cut.dropper_lengths
     springless = _without_springs(problem)
-    model = build(springless, mesh, length, form=form, cut_lengths=wanted)
+    model = build(springless, mesh, length, form=form, cut_lengths=cut.dropper_lengths)
     potential = Potential(cut, model, form, form.dropper_length + errors)
     if stiff is not None and not same_matrices(stiff.model, model):
         stiff = None
@@ -382,8 +376,7 @@ def hang(
         model.form = rest.form
         if all(map(np.array_equal, dropper_directions(model), model.droppers.direction)):
             return model, rest.form  # no matrix depends on the shape
-    hung = build(problem, mesh, length, form=rest.form, gap=rest.gap, cut_lengths=wanted)
-    return hung, rest.form
+    return rebuilt(model, problem=problem, form=rest.form, gap=rest.gap), rest.form
 
 
 def _without_springs(problem: Problem) -> Problem:
