@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import linalg as sparse_linalg
 
 from catenary.base.errors import InputError
 from catenary.meshgen.line import Line, SteadyArms
@@ -26,19 +25,19 @@ from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build, rebuilt
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium, LateralShape
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.potential import curve_load, dead_loads, exact_moments
-from catenary.solver.statics.repeated_ends import repeated_ends, settled
-from catenary.solver.statics.rest_nearby import StiffLine, errors_of_length, hang
-from catenary.solver.statics.sparse_sum import (
-    BandedFactors,
+from catenary.solver.statics.plane_at_rest import (
+    Followed,
     Part,
+    PlaneAtRest,
     clamp_parts,
-    columns_of,
     springs_between,
-    summed,
     wire_parts,
 )
+from catenary.solver.statics.potential import curve_load, dead_loads, exact_moments
+from catenary.solver.statics.repeated_ends import repeated_ends
+from catenary.solver.statics.rest_nearby import StiffLine, errors_of_length, hang
 
 # Lengths are printed to a tenth of a millimetre; the iteration contracts by the ratio of dropper
 # weight to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in forces.
@@ -218,43 +217,41 @@ class _HangingWires:
     """
 
     def __init__(self, model: Model, exact: bool = False) -> None:
-        self._w = 2 * model.row_of_node
+        self._w = w = 2 * model.row_of_node
         self.moments = exact_moments(model) if exact else None
-        n = 2 * model.mesh.n_nodes
-        parts, self._spring_load = _springs_and_wires(model, self._w, exact)
+        parts, self._spring_load = _springs_and_wires(model, w, exact)
         nodes, heights, held_at = _given_heights(model)
-        self._repeated = repeated_ends(model)
-        ends = self._w[self._repeated.ends]
-        self._at_ends = np.concatenate([ends, ends + 1])
-        self._pulls = columns_of(parts, self._at_ends, n)
-        self._given = np.concatenate([self._w[nodes], ends + 1])
-        heights = np.concatenate([heights, np.zeros(ends.size)])
-        self._heights = np.zeros(n)
-        self._heights[self._given] = heights
+        repeated = repeated_ends(model)
+        ends, masts, level = w[repeated.ends], w[repeated.masts[0]], np.zeros(repeated.rise.size)
         # Without weight the forces of all droppers are zero.
         self._weighted = model.simulated.gravity != 0.0
-        upper, lower = self._w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]].T
-        rows = np.concatenate([self._w[held_at], ends + 1, upper])
-        columns = np.concatenate([self._given, lower])
-        sign = np.repeat([-1.0, 1.0], [self._given.size, upper.size])
-        forces = rows, columns, sign
-        self._factor = BandedFactors(parts, self._given, heights, forces, n)
+        self._plane = PlaneAtRest(
+            parts,
+            np.concatenate([w[nodes], ends + 1]),
+            np.concatenate([heights, level]),
+            np.concatenate([w[held_at], ends + 1]),
+            w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]],
+            Followed(
+                np.concatenate([ends, ends + 1]),
+                np.concatenate([masts, masts + 1]),
+                np.concatenate([repeated.rise, level]),
+            ),
+            2 * model.mesh.n_nodes,
+        )
 
     def at_rest(self, model: Model, before: Equilibrium | None) -> Equilibrium:
         """The line at rest under the weights of ``model``, which may differ in them only, and under
         what arms lift of their own and a twist of the track pulls in the shape ``before``."""
-        mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
-        load = self._spring_load - self._factor.from_given
+        mesh = model.mesh
         dead = dead_loads(model) + curve_load(model, before)
         if self.moments is not None:
             dead += self.moments
-        load[self._w] += dead[model.dofs(every)]
-        load[self._w + 1] += dead[model.dofs(every, "theta_y")]
+        load = self._spring_load + _in_plane(model, dead, UPRIGHT)
         holding = _holding(model)
         if before is not None and before.lateral is not None:
             at = self._w[mesh.steady_arms[~holding]]
             np.add.at(load, at, before.lateral.arm_force[~holding, 1])
-        solution, held_by = self._solve(load)
+        solution, held_by = self._plane.solve(load)
         height, slope = solution[self._w], solution[self._w + 1]
         n = mesh.droppers.shape[0]
         force = held_by[:n] if self._weighted else np.zeros(n)
@@ -264,23 +261,6 @@ class _HangingWires:
         lift[np.flatnonzero(holding)[by_group]] = held_by[first : first + by_group.size]
         cut = stretched - model.dropper_slopes.stretch_under(force)
         return Equilibrium(height, slope, force, cut, arm_lift=lift)
-
-    def _solve(self, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Heights and slopes (n,) under a load, and the forces by which given ones are held."""
-        given, first = self._given, self._heights[self._at_ends]
-        masts, rise = self._w[self._repeated.masts[0]], self._repeated.rise
-        found = solution = np.zeros(0)
-
-        def turn(values: np.ndarray) -> np.ndarray:
-            nonlocal found, solution
-            found = self._factor.solve(load - self._pulls @ (values - first))
-            solution = found.copy()
-            solution[given] = self._heights[given]
-            solution[self._at_ends] = values
-            return np.concatenate([solution[masts] + rise, solution[masts + 1]])
-
-        settled(turn, first)
-        return solution, found[given]
 
 
 def _holding(model: Model) -> np.ndarray:
@@ -425,39 +405,40 @@ def lateral_shape(
     InputError
         If an arm that holds its wire's height has too small a radial force to carry it.
     """
-    mesh = model.mesh
-    at, n = 2 * model.row_of_node, 2 * mesh.n_nodes
+    mesh, at = model.mesh, 2 * model.row_of_node
     upper, lower = mesh.droppers.T
     rise = form.height[upper] - form.height[lower]
     parts = wire_parts(model, at, exact=moments is not None) + clamp_parts(model, at)
     parts.append(springs_between(at[mesh.droppers], form.dropper_force / rise))
-    stiffness, load = summed(parts, n).tocsr(), np.zeros(n)
-    every, pulls = np.arange(mesh.n_nodes), dead_loads(model) + curve_load(model, form)
+    pulls = dead_loads(model) + curve_load(model, form)
     if moments is not None:
         pulls += moments
-    load[at], load[at + 1] = pulls[model.dofs(every, "v")], pulls[model.dofs(every, "theta_z")]
-    nodes, places = _held(model)
-    given = np.zeros(n, dtype=bool)
-    given[at[nodes]] = True
-    course = np.zeros(n)
-    course[at[nodes]] = places
-    repeated = repeated_ends(model)
-    slopes, before = at[repeated.ends] + 1, at[repeated.masts[1]] + 1
-    given[slopes] = True
-    free = np.flatnonzero(~given)
-    factors = sparse_linalg.splu(stiffness[free][:, free].tocsc(), permc_spec="NATURAL")
-
-    def turn(values: np.ndarray) -> np.ndarray:
-        course[free], course[slopes] = 0.0, values
-        course[free] = factors.solve((load - stiffness @ course)[free])
-        return np.asarray(course[before])
-
-    settled(turn, np.zeros(slopes.size))
-    y, slope = course[at], course[at + 1]
-    held_by = (stiffness @ course - load)[at[mesh.steady_arms]]
+    (nodes, places), repeated = _held(model), repeated_ends(model)
+    slopes, level = at[repeated.ends] + 1, np.zeros(repeated.ends.size)
+    given = np.concatenate([at[nodes], slopes])
+    plane = PlaneAtRest(
+        parts,
+        given,
+        np.concatenate([places, level]),
+        given,
+        at[mesh.droppers[:0]],
+        Followed(slopes, at[repeated.masts[1]] + 1, level),
+        2 * mesh.n_nodes,
+    )
+    course, held = plane.solve(_in_plane(model, pulls, LEVEL))
+    held_by = held[np.searchsorted(nodes, mesh.steady_arms)]
     lift = _carried(model, held_by, form.arm_lift)
     arm_force = np.column_stack([held_by, lift, np.zeros(held_by.size)])
-    return LateralShape(y, slope, arm_force)
+    return LateralShape(course[at], course[at + 1], arm_force)
+
+
+def _in_plane(model: Model, loads: np.ndarray, plane: tuple[str, str]) -> np.ndarray:
+    """Loads (n_dofs,) on the unknowns of a plane, deflection and slope of each node in turn."""
+    every, at = np.arange(model.mesh.n_nodes), 2 * model.row_of_node
+    load = np.zeros(2 * every.size)
+    for number, name in enumerate(plane):
+        load[at + number] = loads[model.dofs(every, name)]
+    return load
 
 
 def _held(model: Model) -> tuple[np.ndarray, np.ndarray]:
