@@ -15,7 +15,7 @@ from catenary.postproc.channels.header import GZIP, NONE, LineRecord, record_wor
 from catenary.postproc.record.snapshots.contents import USUAL_FIELDS
 from catenary.postproc.record.snapshots.field_layout import Course, FieldRecord
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.effects.shipped.axial_effects import moves_along
+from catenary.solver.effects.shipped.motion_effects import moves_along
 from catenary.solver.model.gauges import gauge_places
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop.views import channels

@@ -276,14 +276,12 @@ def _springs_and_wires(model: Model, w: np.ndarray, exact: bool) -> tuple[list[P
     relaxed at its height: it gives way under the line's weight. Supports that hold a wire at the
     height wanted do so by an unknown force. Arms are without force at rest.
     """
-    mesh, line = model.mesh, model.problem.line
-    n = 2 * mesh.n_nodes
-    load = np.zeros(n)
-    parts = wire_parts(model, w, exact)
-    for number, supports in enumerate(line.supports):
+    line, parts = model.problem.line, wire_parts(model, w, exact)
+    load = np.zeros(2 * model.mesh.n_nodes)
+    for supports, nodes in model.supports_by_group():
         if supports.holds:
             continue
-        dofs = w[mesh.supports[mesh.support_group == number]]
+        dofs = w[nodes]
         alike = np.zeros(dofs.size, dtype=np.int64)
         parts.append(Part(dofs[:, None], np.full((1, 1, 1), supports.stiffness), alike))
         relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
@@ -297,12 +295,11 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     which the forces act by which they are held."""
     mesh, line = model.mesh, model.problem.line
     nodes, heights = [mesh.droppers[:, 1]], [np.zeros(mesh.droppers.shape[0])]
-    for number, group in enumerate(line.droppers):
-        mine = mesh.dropper_group == number
+    for group, mine in model.droppers_by_group():
         heights[0][mine] = _wanted(model, line.wire(group.lower), mesh.droppers[mine, 1])
-    for number, arms in enumerate(line.steady_arms):
+    for arms, mine in model.arms_by_group():
         if arms.kind.holds_height:
-            nodes.append(mesh.steady_arms[mesh.arm_group == number])
+            nodes.append(mesh.steady_arms[mine])
             heights.append(_wanted(model, line.wire(arms.wire), nodes[-1]))
     for wire in line.wires:
         nodes.append(mesh.anchors[np.isin(mesh.anchors, mesh.wires[wire.name])])
@@ -311,9 +308,9 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         else:
             heights.append(_wanted(model, wire, nodes[-1]))
     held_at = list(nodes)
-    for number, supports in enumerate(line.supports):
+    for supports, own in model.supports_by_group():
         if supports.holds:
-            held_at.append(mesh.supports[mesh.support_group == number])
+            held_at.append(own)
             chain = mesh.wires[supports.holds]
             nodes.append(chain[np.searchsorted(mesh.x(chain), mesh.x(held_at[-1]) - SAME_PLACE)])
             heights.append(_wanted(model, line.wire(supports.holds), nodes[-1]))
@@ -446,8 +443,8 @@ def _held(model: Model) -> tuple[np.ndarray, np.ndarray]:
     mesh, line = model.mesh, model.problem.line
     nodes: list[np.ndarray] = []
     places: list[np.ndarray] = []
-    held = [(mesh.steady_arms[mesh.arm_group == i], a.wire) for i, a in enumerate(line.steady_arms)]
-    held += [(mesh.supports[mesh.support_group == i], s.wire) for i, s in enumerate(line.supports)]
+    held = [(mesh.steady_arms[mine], arms.wire) for arms, mine in model.arms_by_group()]
+    held += [(own, supports.wire) for supports, own in model.supports_by_group()]
     for what, name in held:
         nodes.append(what)
         places.append(line.wire(name).points(mesh.x(what))[:, 1])
@@ -462,9 +459,8 @@ def _carried(model: Model, radial: np.ndarray, arm_lift: np.ndarray) -> np.ndarr
     """Vertical force of each arm on its wire, (n_arms,) [N]; ``radial`` (n_arms,) is the lateral
     one [N]."""
     mesh, force = model.mesh, np.zeros(radial.size)
-    for number, arms in enumerate(model.problem.line.steady_arms):
-        mine, kind = mesh.arm_group == number, arms.kind
-        pull = np.abs(radial[mine])
+    for arms, mine in model.arms_by_group():
+        kind, pull = arms.kind, np.abs(radial[mine])
         if kind.length == 0.0:
             continue
         if kind.inclination is not None:

@@ -75,11 +75,7 @@ def springs_between(dofs: np.ndarray, stiffness: np.ndarray | float) -> Part:
 
 def clamp_parts(model: Model, at: np.ndarray) -> list[Part]:
     """Clamps of one wire on another, which hold both ways; ``at`` as in ``wire_parts``."""
-    line, parts = model.problem.line, []
-    for number, clamps in enumerate(line.clamps):
-        pairs = at[model.mesh.clamps[line.clamp_group == number]]
-        parts.append(springs_between(pairs, clamps.stiffness))
-    return parts
+    return [springs_between(at[pairs], own.stiffness) for own, pairs in model.clamps_by_group()]
 
 
 class Followed(NamedTuple):
