@@ -144,7 +144,7 @@ def _about_rest(
     if changed.simulated.tensioner is not None and about.along.size:
         # Stops are where they were: displacements count from the first rest.
         ends, along = [end.node for end in tensioned_ends(first)], about.along.copy()
-        along[ends] = form.along[ends] if form.along.size else 0.0
+        along[ends] = form.moved_along(np.array(ends))
         about = replace(about, along=along)
     model = rebuilt(changed, form=about)
     unknowns, weights = model.droppers.direction

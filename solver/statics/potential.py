@@ -152,9 +152,8 @@ class Potential:
             dropper_length=self._cut,
         )
         if "u" in model.unknowns:
-            before = known.along if known.along.size else np.zeros(every.size)
             gained = {wire.name: wire.gained(moved) for wire in self._wires}
-            along = before + moved[model.dofs(every, "u")]
+            along = known.moved_along(every) + moved[model.dofs(every, "u")]
             form = replace(form, along=along, gained_tension=gained)
         if known.lateral is not None:
             force = known.lateral.arm_force.copy()

@@ -32,12 +32,7 @@ from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.defects import HardSpot
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.potential import Potential, dead_loads
-from catenary.solver.statics.repeated_ends import (
-    MOST_TURNS,
-    NO_ENDS,
-    ends_that_follow,
-    unsettled,
-)
+from catenary.solver.statics.repeated_ends import NO_ENDS, OF_REST, ends_that_follow, settled
 
 # Displacements change by less than this where Newton's method ends [m].
 _SETTLED = 1e-9
@@ -186,21 +181,17 @@ class RestNearby:
         InputError
             If there is none.
         """
-        potential = self._potential
-        moved = np.zeros(self._model.n_dofs)
+        potential, ends, rests = self._potential, self._follow, list[Rest]()
         slack = self._switches & (potential.reserve(potential.known) < -_NO_FORCE)
-        ends, before = self._follow, np.inf
-        for _ in range(MOST_TURNS):
-            rest = self._find(moved, slack)
-            if not ends.ends.size:
-                return rest
-            change = float(np.abs(rest.moved[ends.masts] - moved[ends.ends]).max())
-            if ends.has_settled(change, before):
-                return rest
-            before, moved = change, rest.moved.copy()
-            moved[ends.ends] = moved[ends.masts]
-            slack = rest.gap > 0.0
-        raise unsettled(change)
+
+        def turn(values: np.ndarray) -> np.ndarray:
+            moved = rests[-1].moved.copy() if rests else np.zeros(self._model.n_dofs)
+            moved[ends.ends] = values
+            rests.append(self._find(moved, rests[-1].gap > 0.0 if rests else slack))
+            return rests[-1].moved[ends.masts]
+
+        settled(turn, np.zeros(ends.ends.size), OF_REST)
+        return rests[-1]
 
     def _find(self, moved: np.ndarray, slack: np.ndarray) -> Rest:
         """The rest near a displacement, from droppers that are slack there, with ends that follow
@@ -249,9 +240,7 @@ class RestNearby:
         load = self._load.copy()
         for end in self._ends:
             if end.pull is None:
-                # Place of the known rest, along the track since the installation [m].
-                known = self._potential.known
-                already = float(known.along[end.end.node]) if known.along.size else 0.0
+                already = float(self._potential.known.moved_along(end.end.node))
                 moved[end.unknown] = end.end.outwards * end.held_at - already
             else:
                 tension = model.problem.line.wire(end.end.wire).tension

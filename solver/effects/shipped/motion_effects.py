@@ -160,9 +160,7 @@ def _tensioners(builder: ModelBuilder) -> None:
         return
     # Stretch is how far an end is outwards: from there on weights sink no further.
     sign = np.array([float(end.outwards) for end in ends])
-    moved = np.zeros(len(ends))
-    if model.form is not None and model.form.along.size:
-        moved = sign * model.form.along[nodes]
+    moved = np.zeros(len(ends)) if model.form is None else sign * model.form.moved_along(nodes)
     direction = Direction(model.dofs(nodes, "u")[:, None], sign[:, None])
     for stop, acts, way in ((_LOWEST, PULLS, -moved), (_HIGHEST, PUSHES, moved)):
         gap = np.maximum(tensioner.travel + way, 0.0)
