@@ -228,12 +228,12 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
             raise InputError("it has other nodes than the last one")
         # Rows of the repeated span, and columns up to the next cross-section.
         start = begins[0] if side == END else begins[1]
-        whole = _matrices(model, start, start + size, start, start + 2 * size)
+        whole = matrices_between(model, start, start + size, start, start + 2 * size)
         joins = np.flatnonzero(whole[:, :, size:].any(axis=(0, 1)))
         own, joined = _without(whole, start, held)
         shared = np.flatnonzero(joined.any(axis=(0, 1)))
         other = begins[1] if side == END else begins[0]
-        beside = _matrices(model, other, other + size, other, other + size)
+        beside = matrices_between(model, other, other + size, other, other + size)
         beside, _ = _without(beside, other, held)
         signs = sideways(model, start + np.arange(size))
         if _mirrored(own, beside, joins, signs, model.simulated.wind is not None):
@@ -248,7 +248,7 @@ def line_beyond(model: Model, side: int, held: np.ndarray) -> LineBeyond:
             raise InputError("wires end elsewhere than at its masts")
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    here = _matrices(model, at_end, int(unknowns[-1]) + 1, at_end, int(unknowns[-1]) + 1)
+    here = matrices_between(model, at_end, int(unknowns[-1]) + 1, at_end, int(unknowns[-1]) + 1)
     here = here[:, shared][:, :, shared]
     return LineBeyond(unknowns, here, span, np.setdiff1d(everything, unknowns))
 
@@ -273,7 +273,7 @@ def span_between(model: Model, mast: float, following: float) -> tuple[np.ndarra
     first, last = model.numbering.first_at(mast), model.numbering.first_at(following)
     end = min(model.numbering.size, 2 * last - first)
     whole = np.zeros((3, last - first, 2 * (last - first)))
-    whole[:, :, : end - first] = _matrices(model, first, last, first, end)
+    whole[:, :, : end - first] = matrices_between(model, first, last, first, end)
     own, joined = whole[:, :, : last - first], whole[:, :, last - first :]
     shared = np.flatnonzero(joined.any(axis=(0, 1)))
     return first + shared, span_matrices(own, joined, shared)
@@ -283,7 +283,7 @@ def shared_at(model: Model, unknowns: np.ndarray) -> np.ndarray:
     """M, C and K of some neighbouring unknowns, (3, m, m), held ones included. Not collective."""
     low, high = int(unknowns[0]), int(unknowns[-1]) + 1
     at = unknowns - low
-    return _matrices(model, low, high, low, high)[:, at][:, :, at]
+    return matrices_between(model, low, high, low, high)[:, at][:, :, at]
 
 
 def _without(whole: np.ndarray, first: int, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -343,7 +343,7 @@ def _places(model: Model, unknowns: np.ndarray) -> list[tuple[int, str]]:
     return found
 
 
-def _matrices(model: Model, first: int, last: int, low: int, high: int) -> np.ndarray:
+def matrices_between(model: Model, first: int, last: int, low: int, high: int) -> np.ndarray:
     """M, C and K of rows [first, last) and columns [low, high), (3, n, m), held ones included."""
     result = np.zeros((3, last - first, high - low))
     kinds = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))

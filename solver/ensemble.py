@@ -29,7 +29,7 @@ from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.contact.forces_on_line import FollowedLinks, ForceColumns, ForcesOnLine
 from catenary.solver.contact.pantographs import Pantographs, nominal_height_rule
 from catenary.solver.effects.all_effects import needs_form, simulated
-from catenary.solver.effects.build_model import build
+from catenary.solver.effects.build_model import rebuilt
 from catenary.solver.integrators.line_integrator import StationPasses, make_line
 from catenary.solver.integrators.line_state import LineState
 from catenary.solver.kernels import native
@@ -88,14 +88,7 @@ class TautLines:
         if self._latest is None or self._latest.rest is not model:
             taut, moved = model, np.zeros(model.n_dofs)
             if model.dropper_gap.any() and not (model.droppers_bend or needs_form(model.problem)):
-                taut = build(
-                    model.problem,
-                    model.mesh,
-                    model.dropper_lengths,
-                    model.broken,
-                    form,
-                    cut_lengths=model.cut_lengths,
-                )
+                taut = rebuilt(model, form=form, gap=None)
                 if self._stiff is None:  # of a line with other matrices no lane takes the result
                     self._stiff = StiffLine(taut)
                 moved, form = _displaced(taut, model.dropper_gap, form, self._stiff)

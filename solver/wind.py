@@ -26,6 +26,7 @@ and without linearisation about the mean the gusts' part is 1/2 rho d C_d (|q| q
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -55,9 +56,6 @@ POSTS, _KEPT = 64, 96
 # Slices in a period of the highest frequency. Linear between them, a wave loses part of itself.
 _SLICES = 5
 
-# Time between slices [s], between which a pressure is linear, and what fills these.
-_Fill = tuple[float, Callable[[int, slice, np.ndarray], None]]
-
 
 def variance_below(wind: Wind, part: int) -> Callable[[np.ndarray], np.ndarray]:
     """Variance [m2/s2] of a part of the gusts below frequencies [Hz], as a function of these."""
@@ -65,18 +63,10 @@ def variance_below(wind: Wind, part: int) -> Callable[[np.ndarray], np.ndarray]:
     assert gusts is not None
     square, mean, height = gusts.friction_velocity**2, wind.mean, wind.height
     if part == UPWARD:
-
-        def upward(n: np.ndarray) -> np.ndarray:
-            return np.asarray(1.5 * square * (1.0 - 1.0 / (1.0 + 4.0 * n * height / mean)))
-
-        return upward
+        return lambda n: 1.5 * square * (1.0 - 1.0 / (1.0 + 4.0 * n * height / mean))
     if part == ACROSS:
-
-        def across(n: np.ndarray) -> np.ndarray:
-            left = (1.0 + 9.5 * n * height / mean) ** (-2.0 / 3.0)
-            return np.asarray(22.5 / 9.5 * square * (1.0 - left))
-
-        return across
+        share = 22.5 / 9.5 * square
+        return lambda n: share * (1.0 - (1.0 + 9.5 * n * height / mean) ** (-2.0 / 3.0))
     if gusts.spectrum == "von_karman":
         from scipy.special import hyp2f1  # not loaded for air without gusts
 
@@ -86,12 +76,7 @@ def variance_below(wind: Wind, part: int) -> Callable[[np.ndarray], np.ndarray]:
 
         return karman
     at_ten = float(wind.speed * wind.profile.growth(10.0, wind.reference_height))
-
-    def davenport(n: np.ndarray) -> np.ndarray:
-        x = 1200.0 * n / at_ten
-        return np.asarray(6.0 * square * (1.0 - (1.0 + x**2) ** (-1.0 / 3.0)))
-
-    return davenport
+    return lambda n: 6.0 * square * (1.0 - (1.0 + (1200.0 * n / at_ten) ** 2) ** (-1.0 / 3.0))
 
 
 class GustField:
@@ -420,12 +405,9 @@ def gust_loads(model: Model, wind: Wind) -> list[FieldLoad]:
     assert gusts is not None
     x = model.mesh.points[:, 0]
     points = gust_points(gusts.spacing, float(x.min()), float(x.max()))
-    pressures = {
-        UPRIGHT: upward_pressure(model, wind, points),
-        LEVEL: _leftward_pressure(model, wind, points),
-    }
+    pressure = GustPressure(model, wind, points)
     found = []
-    for plane, (interval, fill) in pressures.items():
+    for plane in (UPRIGHT, LEVEL):
         parts = [
             (*forces_along(model, wire.name, plane, points), drag_width(wire))
             for wire in model.problem.line.wires
@@ -434,65 +416,50 @@ def gust_loads(model: Model, wind: Wind) -> list[FieldLoad]:
         if parts:
             unknowns = np.concatenate([unknowns for unknowns, _, _ in parts])
             weights = sparse.vstack([width * weights for _, weights, width in parts]).tocsr()
-            found.append(FieldLoad(unknowns, weights, interval, fill))
+            fill = functools.partial(pressure.fill, plane is LEVEL)
+            found.append(FieldLoad(unknowns, weights, pressure.interval, fill))
     return found
 
 
-def upward_pressure(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
-    """Upward force of gusts over diameter times drag coefficient [N/m2]. Not collective.
+class GustPressure:
+    """Force of gusts on a wire over its diameter times drag coefficient [N/m2]. Not collective.
+
+    Attributes
+    ----------
+    interval : time between slices, between which the force is linear [s]
 
     Parameters
     ----------
-    model : Model
-        Discrete line.
-    wind : Wind
-        Wind with gusts.
-    points : ndarray, shape (n,)
-        Places along the track, even and ascending [m].
-
-    Returns
-    -------
-    interval : float
-        Time between slices, between which the force is linear [s].
-    fill : callable
-        ``fill(first, part, slices)`` fills ``slices`` (m, k) at the k points of ``part`` and at the
-        times (first + i) ``interval``.
+    points : (n,) places along the track, even and ascending [m]
     """
-    mean = across_at(wind, model.problem.tunnels, points)
-    exposed = gust_exposure(wind, points, model.problem.tunnels)
-    upward = GustField(wind, UPWARD, points, _apart(points))
-    across = _Across(wind, points, exposed) if wind.quadratic else None
 
-    def fill(first: int, part: slice, slices: np.ndarray) -> None:
-        upward.fill(first, part, slices)
-        slices *= exposed[part]
-        if across is None:
-            slices *= 0.5 * wind.density * np.abs(mean[part])
-        else:
-            lateral = mean[part] + across.at(first, part, slices.shape[0])
-            slices *= 0.5 * wind.density * np.hypot(lateral, slices)
+    def __init__(self, model: Model, wind: Wind, points: np.ndarray) -> None:
+        self._wind, self._mean = wind, across_at(wind, model.problem.tunnels, points)
+        self._exposed = gust_exposure(wind, points, model.problem.tunnels)
+        self._upward = GustField(wind, UPWARD, points, _apart(points))
+        self._across = _Across(wind, points, self._exposed)
+        self.interval = self._upward.interval
 
-    return upward.interval, fill
-
-
-def _leftward_pressure(model: Model, wind: Wind, points: np.ndarray) -> _Fill:
-    """Force of gusts to the left over diameter times drag coefficient [N/m2]."""
-    mean = across_at(wind, model.problem.tunnels, points)
-    exposed = gust_exposure(wind, points, model.problem.tunnels)
-    across = _Across(wind, points, exposed)
-    upward = GustField(wind, UPWARD, points, _apart(points)) if wind.quadratic else None
-
-    def fill(first: int, part: slice, slices: np.ndarray) -> None:
-        own = across.at(first, part, slices.shape[0])
-        if upward is None:
-            slices[:] = wind.density * np.abs(mean[part]) * own
+    def fill(self, leftward: bool, first: int, part: slice, slices: np.ndarray) -> None:
+        """Fill ``slices`` (m, k) with the force upwards, or ``leftward``, at the k points of
+        ``part`` and at the times (first + i) ``interval``."""
+        wind, mean = self._wind, self._mean[part]
+        if not leftward or wind.quadratic:
+            self._upward.fill(first, part, slices)
+            slices *= self._exposed[part]
+        if not wind.quadratic and not leftward:
+            slices *= 0.5 * wind.density * np.abs(mean)
             return
-        upward.fill(first, part, slices)
-        lateral = mean[part] + own
-        size = np.hypot(lateral, exposed[part] * slices)
-        slices[:] = 0.5 * wind.density * (size * lateral - np.abs(mean[part]) * mean[part])
-
-    return across.interval, fill
+        across = self._across.at(first, part, slices.shape[0])
+        if not wind.quadratic:
+            slices[:] = wind.density * np.abs(mean) * across
+            return
+        size = np.hypot(mean + across, slices)
+        if leftward:
+            slices[:] = size * (mean + across) - np.abs(mean) * mean
+        else:
+            slices *= size
+        slices *= 0.5 * wind.density
 
 
 def _apart(points: np.ndarray) -> float:

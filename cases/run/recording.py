@@ -18,7 +18,7 @@ from catenary.postproc.record.snapshots.contents import (
     FieldRecord,
 )
 from catenary.solver.effects.all_effects import simulated
-from catenary.solver.effects.shipped.axial_effects import moves_along
+from catenary.solver.effects.shipped.motion_effects import moves_along
 from catenary.solver.model.gauges import gauge_places
 from catenary.solver.problem.problem import Problem
 from catenary.solver.time_loop.views import channels

@@ -16,7 +16,7 @@ from catenary.postproc.evaluate.statistics import (
 )
 from catenary.postproc.evaluate.wording import counted, stiffness_words
 from catenary.postproc.read.results import Results
-from catenary.solver.effects.shipped.stiff_link_effects import STIFF
+from catenary.solver.effects.shipped.line_effects import STIFF
 from catenary.solver.problem.watched_links import HIGH_STOP, LOW_STOP
 
 # Share of a gust's load that linear drag may leave out.

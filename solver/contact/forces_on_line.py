@@ -14,7 +14,7 @@ from catenary.solver.integrators.line_integrator import LineIntegrator
 from catenary.solver.integrators.line_state import LineState
 from catenary.solver.kernels import native
 from catenary.solver.linear.pieces import columns_by_pieces
-from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH, ShortColumns
+from catenary.solver.linear.unit_responses import NO_COLUMNS, STRETCH, Forces, ShortColumns
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest_shape import Equilibrium
@@ -174,9 +174,9 @@ class LinkCoupling:
         self._per_acceleration[owned] = own["stiffness"] * line.position_factor
         self._per_acceleration[owned] += own["damping"] * line.velocity_factor
         self._band: np.ndarray | None = None
-        places = unknowns[:, None], weights[:, None], law["place"], table.half_length
+        forces = Forces(unknowns[:, None], weights[:, None], law["place"], table.half_length)
         operators = line.operators.in_pieces
-        self.columns = columns_by_pieces(line.responses, operators, places, self._couple)
+        self.columns = columns_by_pieces(line.responses, operators, forces, self._couple)
         band = self._band_of(self.columns)
         if comm.size > 1:
             band = comm.reduce(band, root=0)
@@ -443,6 +443,7 @@ def _columns_of_nodes(
         nodes["begin"][mine], nodes["at"][mine] = found.start[which], found.at[which]
         nodes["width"][mine] = found.width[which]
 
-    places = dofs, free[dofs].astype(float), wires.x[chosen]
-    found = columns_by_pieces(line.responses, line.operators.in_pieces, places, put)
+    x, weights = wires.x[chosen], free[dofs].astype(float)
+    forces = Forces(dofs, weights, x, np.zeros(x.size))
+    found = columns_by_pieces(line.responses, line.operators.in_pieces, forces, put)
     return found.data, found.reach

@@ -7,20 +7,28 @@ from dataclasses import replace
 from functools import wraps
 from typing import TypeVar
 
-from catenary.solver.effects.effect import Effect, NamedWire, registered
-from catenary.solver.effects.shipped import (  # noqa: F401  (registers)
-    air_effects,
-    axial_effects,
+from catenary.solver.effects.effect import Effect, NamedWire, register, registered
+from catenary.solver.effects.shipped import (
     defect_effects,
-    end_effects,
-    hardware_effects,
-    lateral_effects,
-    pantograph_effects,
-    stiff_link_effects,
-    vertical_effects,
+    line_effects,
+    motion_effects,
+    train_effects,
 )
 from catenary.solver.model.unknowns import Group
 from catenary.solver.problem.problem import Problem, Simulated
+
+# In the order in which they are built.
+register(
+    *line_effects.VERTICAL,
+    *train_effects.AIR,
+    *motion_effects.ALONG_TRACK,
+    *line_effects.HARDWARE,
+    *defect_effects.DEFECTS,
+    motion_effects.LATERAL,
+    *motion_effects.ENDS,
+    *train_effects.PANTOGRAPHS,
+    line_effects.STIFF_LINKS,
+)
 
 
 def registry() -> dict[str, Effect]:

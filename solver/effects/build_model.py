@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from catenary.meshgen.mesh import LineMesh
@@ -96,13 +98,18 @@ def with_wires_apart(model: Model) -> Model:
     collective."""
     if not effects.move_together(model.problem):
         return model
-    return build(
-        model.problem,
-        model.mesh,
-        model.dropper_lengths,
-        model.broken,
-        model.form,
-        model.dropper_gap,
-        apart=True,
+    return rebuilt(model, apart=True)
+
+
+def rebuilt(model: Model, **other: Any) -> Model:
+    """The model as it was built, but for ``other`` arguments of ``build``. Not collective."""
+    same = dict(
+        problem=model.problem,
+        mesh=model.mesh,
+        dropper_lengths=model.dropper_lengths,
+        broken=model.broken,
+        form=model.form,
+        gap=model.dropper_gap,
         cut_lengths=model.cut_lengths,
     )
+    return build(**{**same, **other})

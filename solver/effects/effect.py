@@ -3,7 +3,7 @@
 An effect declares all that it contributes: unknowns of each wire, terms of the model
 (matrices, weights, loads in time), laws of the time loop and of the line at rest, limits of a scene
 that it lifts. The scene schema, the plan, the report and the model all read this one table. To add
-an effect, write a module that makes one and registers it with ``register``.
+an effect, write a module that makes one and give it its place where all are registered.
 """
 
 from __future__ import annotations

@@ -45,6 +45,7 @@ from catenary.solver.linear.station_rows import (
 from catenary.solver.linear.unit_responses import (
     FELT_AT_MOST,
     FeltFurther,
+    Forces,
     Places,
     ShortColumns,
     UnitResponses,
@@ -462,7 +463,7 @@ def _kinds_of_elements(
 def columns_by_pieces(
     responses: UnitResponses,
     operators: OperatorPieces | None,
-    places: tuple[np.ndarray, ...],
+    forces: Forces,
     made: Made,
 ) -> ShortColumns:
     """Columns as ``UnitResponses.columns`` makes them: all at once, or by the pieces that there
@@ -474,17 +475,17 @@ def columns_by_pieces(
         Solver of columns.
     operators : OperatorPieces or None
         Operators of the pieces, None if the line is whole.
-    places : tuple of ndarray
-        Arguments of ``UnitResponses.columns``.
+    forces : Forces
+        Forces that columns answer.
     made : Made
         Function that is called with all columns and the numbers of the places that have
         theirs now.
     """
     if operators is None:
-        columns = responses.columns(*places)
+        columns = responses.columns(forces)
         made(columns, np.arange(columns.start.size))
         return columns
-    found, reach = responses.places(*places)
+    found, reach = responses.places(forces)
     x, pieces = found.x, operators.pieces
     # Places in their order along the track, and which of them are before each piece.
     order = np.argsort(x, kind="stable")

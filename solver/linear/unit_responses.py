@@ -172,6 +172,22 @@ class ShortColumns(NamedTuple):
 NO_COLUMNS = ShortColumns(*(np.zeros(0, dtype=np.int64),) * 3, np.zeros(0), 0.0)
 
 
+class Forces(NamedTuple):
+    """Unit forces on a line, k at each of n places.
+
+    Attributes
+    ----------
+    dofs, weights : (n, k, m) unknowns of each, and weights on these
+    x : (n,) places [m]
+    half : (n,) reach of the unknowns of a place to both sides of it [m]
+    """
+
+    dofs: np.ndarray
+    weights: np.ndarray
+    x: np.ndarray
+    half: np.ndarray
+
+
 class UnitResponses:
     """Answers of a line's step operator A to unit forces. Not collective but for ``columns``.
 
@@ -200,32 +216,15 @@ class UnitResponses:
         self._comm, self._model, self._ownership = comm, model, ownership
         self.windows = windows
 
-    def columns(
-        self,
-        dofs: np.ndarray,
-        weights: np.ndarray,
-        x: np.ndarray,
-        half_length: np.ndarray | None = None,
-    ) -> ShortColumns:
-        """Columns for right-hand sides with ``weights`` on ``dofs``, both (n, k, m). Collective.
-
-        Parameters
-        ----------
-        dofs : ndarray, shape (n, k, m)
-            Unknowns of k forces at each of n places.
-        weights : ndarray, shape (n, k, m)
-            Weights on these.
-        x : ndarray, shape (n,)
-            Places [m].
-        half_length : ndarray, shape (n,), optional
-            Reach of the unknowns of a place to both sides of it [m], zero if left out.
+    def columns(self, forces: Forces) -> ShortColumns:
+        """Columns for unit forces. Collective.
 
         Raises
         ------
         RunBroken
             On all ranks, if a column does not vanish outside of its window.
         """
-        places, reach = self.places(dofs, weights, x, half_length)
+        places, reach = self.places(forces)
         like = LikeStations(self._model) if self._like is None else self._like
         while True:
             try:
@@ -235,25 +234,14 @@ class UnitResponses:
                 # Some of the columns were tried for the reach.
                 reach = min(self.windows.reach, _MORE * reach)
                 windows = self.windows._replace(reach=reach)
-                places = Places.of(windows, self._ownership, dofs, weights, x, places.half)
+                places = Places.of(windows, self._ownership, forces)
 
-    def places(
-        self,
-        dofs: np.ndarray,
-        weights: np.ndarray,
-        x: np.ndarray,
-        half_length: np.ndarray | None = None,
-    ) -> tuple[Places, float]:
-        """Places of ``columns``, which has the same parameters, and the reach of their windows [m].
-
-        Collective.
-        """
-        half = np.zeros(x.size) if half_length is None else half_length
+    def places(self, forces: Forces) -> tuple[Places, float]:
+        """Places of the columns for forces, and the reach of their windows [m]. Collective."""
         windows = self.windows
-        if windows.reach > _LONG and x.size:
-            windows = windows._replace(reach=self._felt(dofs, weights, x, half))
-        places = Places.of(windows, self._ownership, dofs, weights, x, half)
-        return places, windows.reach
+        if windows.reach > _LONG and forces.x.size:
+            windows = windows._replace(reach=self._felt(forces))
+        return Places.of(windows, self._ownership, forces), windows.reach
 
     def solve(
         self, places: Places, like: LikeStations, reach: float, felt: float = _FELT
@@ -282,12 +270,10 @@ class UnitResponses:
             )
         return at[kinds], data
 
-    def _felt(
-        self, dofs: np.ndarray, weights: np.ndarray, x: np.ndarray, half: np.ndarray
-    ) -> float:
+    def _felt(self, forces: Forces) -> float:
         """Distance at which some of the columns fall to round-off [m], with a margin; the same on
         all ranks."""
-        numbering, furthest = self.windows.numbering, 0.0
+        numbering, furthest, (dofs, weights, x, half) = self.windows.numbering, 0.0, forces
         for place in np.unique(np.linspace(0, x.size - 1, _PROBES).astype(int)):
             near, to_side = slice(place, place + 1), half[place] + self.windows.reach
             first, last = numbering.within(x[place] - to_side, x[place] + to_side)
@@ -368,7 +354,7 @@ class UnitResponses:
 
 
 class Places(NamedTuple):
-    """Places at which columns are wanted, and their windows.
+    """Places at which columns are wanted, their ``Forces``, and their windows.
 
     ``first`` and ``last`` (n,) are stations of the windows; ``begin`` and ``width`` (n,) the local
     unknowns in them that this rank owns.
@@ -384,22 +370,14 @@ class Places(NamedTuple):
     width: np.ndarray
 
     @classmethod
-    def of(
-        cls,
-        windows: Windows,
-        ownership: Ownership,
-        dofs: np.ndarray,
-        weights: np.ndarray,
-        x: np.ndarray,
-        half: np.ndarray,
-    ) -> Places:
-        numbering, to_side = windows.numbering, half + windows.reach
-        first, last = numbering.stations_within(x - to_side, x + to_side)
+    def of(cls, windows: Windows, ownership: Ownership, forces: Forces) -> Places:
+        numbering, to_side = windows.numbering, forces.half + windows.reach
+        first, last = numbering.stations_within(forces.x - to_side, forces.x + to_side)
         low, high = (
             np.clip(numbering.starts[station], ownership.first, ownership.last)
             for station in (first, last)
         )
-        return cls(dofs, weights, x, half, first, last, low - ownership.first, high - low)
+        return cls(*forces, first, last, low - ownership.first, high - low)
 
 
 def _stretches(x: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:

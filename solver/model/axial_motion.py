@@ -165,8 +165,7 @@ def at_stop(model: Model, end: WireEnd) -> bool:
     tensioner = model.simulated.tensioner
     if tensioner is None or tensioner.travel is None or model.form is None:
         return False
-    moved = model.form.along[end.node] if model.form.along.size else 0.0
-    return bool(abs(moved) > tensioner.travel - _AT_STOP)
+    return bool(abs(model.form.moved_along(end.node)) > tensioner.travel - _AT_STOP)
 
 
 def mid_points(model: Model) -> np.ndarray:

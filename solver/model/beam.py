@@ -23,6 +23,10 @@ _THINNEST = 1e-4
 # Below this k the series of k coth k - 1 is used: it leaves out 2 k^4 / 315 of the whole, and what
 # the difference would lose is EPS / k^2, both 1e-10 at most.
 _SERIES = 1e-2
+# Matrices of elements of a unit length: bending, tension, mass.
+_BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+_TENSION = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]) / 30
+_MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) / 420
 
 
 def stiffness(
@@ -44,35 +48,22 @@ def stiffness(
     ndarray, shape (n, 4, 4)
         Forces [N] and moments [N m] for unit displacements [m] and rotations [rad].
     """
-    one = np.ones_like(length)
-    bending = _matrix(
-        [12 * one, 6 * length, -12 * one, 6 * length],
-        [4 * length**2, -6 * length, 2 * length**2],
-        [12 * one, -6 * length],
-        [4 * length**2],
-    )
-    geometric = _matrix(
-        [36 * one, 3 * length, -36 * one, 3 * length],
-        [4 * length**2, -3 * length, -(length**2)],
-        [36 * one, -3 * length],
-        [4 * length**2],
-    )
-    return (bending_stiffness / length**3)[:, None, None] * bending + (tension / (30 * length))[
-        :, None, None
-    ] * geometric
+    bending = _scaled(_BENDING, bending_stiffness / length**3, length)
+    return bending + _scaled(_TENSION, tension / length, length)
 
 
 def mass(length: np.ndarray, mass_per_length: float | np.ndarray) -> np.ndarray:
     """Consistent mass matrices, shape (n, 4, 4), for lengths (n,) [m] and masses per length, of all
     or (n,) of each [kg/m]."""
+    return _scaled(_MASS, mass_per_length * length, length)
+
+
+def _scaled(of_unit: np.ndarray, factor: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Matrices (n, 4, 4) of elements: ``factor`` (n,) times those of a unit length, rotations times
+    the ``length`` (n,)."""
     one = np.ones_like(length)
-    shape = _matrix(
-        [156 * one, 22 * length, 54 * one, -13 * length],
-        [4 * length**2, 13 * length, -3 * length**2],
-        [156 * one, -22 * length],
-        [4 * length**2],
-    )
-    return (mass_per_length * length / 420)[:, None, None] * shape
+    units = np.stack([one, length, one, length], axis=1)
+    return np.asarray(factor[:, None, None] * of_unit * units[:, :, None] * units[:, None, :])
 
 
 def uniform_load(length: np.ndarray) -> np.ndarray:
@@ -89,17 +80,6 @@ def linear_load(length: np.ndarray) -> np.ndarray:
     share /= np.array([[20.0], [60.0], [20.0], [60.0]])
     powers = np.stack([length, length**2, length, length**2], axis=1)
     return np.asarray(powers[:, :, None] * share)
-
-
-def _matrix(*upper_rows: list[np.ndarray]) -> np.ndarray:
-    """Symmetric matrices, shape (n, 4, 4), from the rows of their upper triangle."""
-    n = upper_rows[0][0].shape[0]
-    result = np.empty((n, 4, 4))
-    for i, row in enumerate(upper_rows):
-        for j, entry in enumerate(row, start=i):
-            result[:, i, j] = entry
-            result[:, j, i] = entry
-    return result
 
 
 def shape_values(xi: _Place, length: _Place) -> np.ndarray:

@@ -108,14 +108,12 @@ class ModelBuilder:
         ``places`` are the directions of the deflections there.
         """
         unknowns, weights = places
-        matrices = mass[:, None, None] * weights[:, :, None] * weights[:, None, :]
-        self.add_elements(component, unknowns, mass=matrices)
+        self.add_elements(component, unknowns, mass=places.matrices(mass))
         self.model.hanging.append(Hanging(unknowns, mass[:, None] * weights))
 
     def add_clamps(self, unknown: str) -> None:
         """Add the clamps between wires against relative motion in one unknown of their nodes."""
-        for number, clamps in enumerate(self.problem.line.clamps):
-            pairs = self.mesh.clamps[self.problem.line.clamp_group == number]
+        for clamps, pairs in self.model.clamps_by_group():
             laws = law(self.mesh.x(pairs[:, 1]), clamps.stiffness)
             self.add_links(clamps.name, between_nodes(self.model, pairs, unknown), laws)
 
@@ -169,8 +167,7 @@ class ModelBuilder:
         # Of links that are slack at rest K holds the stiffness that they keep.
         slack = model.dropper_gap > 0.0
         matrices[slack] *= model.simulated.kept_ratio
-        for number, group in enumerate(self.problem.line.droppers):
-            mine = mesh.dropper_group == number
+        for group, mine in model.droppers_by_group():
             unknowns = model.droppers.direction.unknowns[mine]
             self.add_elements(group.name, unknowns, stiffness=matrices[mine], of_shape=True)
             if self.problem.slack_dampers_act and slack[mine].any():
@@ -179,11 +176,17 @@ class ModelBuilder:
     def _add_dampers(self, component: str, which: np.ndarray) -> None:
         """Dampers of droppers that are slack at rest and whose dampers act nevertheless."""
         model = self.model
-        unknowns, weights = (part[which] for part in model.droppers.direction)
+        direction = model.droppers.direction.some(which)
         kept = (model.dropper_damping - model.released_damping)[which]
         lacking = (1.0 - model.simulated.kept_ratio) * kept
-        damping = lacking[:, None, None] * weights[:, :, None] * weights[:, None, :]
-        self.add_elements(component, unknowns, damping=damping)
+        self.add_elements(component, direction.unknowns, damping=direction.matrices(lacking))
+
+    def add_pendulums(self, direction: Direction, stiffness: np.ndarray) -> None:
+        """Stiffness (n_droppers,) [N/m] of droppers across themselves, as of pendulums."""
+        for group, mine in self.model.droppers_by_group():
+            own = direction.some(mine)
+            matrices = own.matrices(stiffness[mine])
+            self.add_elements(group.name, own.unknowns, stiffness=matrices, of_shape=True)
 
     def add_load(self, load: Load) -> None:
         """A load in time, of one of the kinds in ``model/loads.py``."""

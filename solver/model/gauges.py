@@ -166,5 +166,4 @@ def _element_at(model: Model, wire: str, place: GaugePlace) -> tuple[int, int]:
 
 def _moved(model: Model, node: int) -> float:
     """Displacement of a node at rest along the track since the installation [m]."""
-    form = model.form
-    return float(form.along[node]) if form is not None and form.along.size else 0.0
+    return 0.0 if model.form is None else float(model.form.moved_along(node))

@@ -39,6 +39,15 @@ class Direction(NamedTuple):
     unknowns: np.ndarray
     weights: np.ndarray
 
+    def matrices(self, factor: np.ndarray) -> np.ndarray:
+        """``factor`` L L^T of each, (n, m, m), such as a stiffness (n,)."""
+        weights = self.weights
+        return np.asarray(factor[:, None, None] * weights[:, :, None] * weights[:, None, :])
+
+    def some(self, which: np.ndarray) -> Direction:
+        """Those of some of the links."""
+        return Direction(self.unknowns[which], self.weights[which])
+
 
 class Bends(NamedTuple):
     """Bends in the laws of links, beyond which their slope differs.
@@ -83,9 +92,7 @@ class Links:
     @property
     def stiffness_matrices(self) -> np.ndarray:
         """k L L^T of each, shape (n, m, m) [N/m]; zero of open links."""
-        weights = self.direction.weights
-        stiffness = np.where(self.law["open"], 0.0, self.law["stiffness"])
-        return np.asarray(stiffness[:, None, None] * weights[:, :, None] * weights[:, None, :])
+        return self.direction.matrices(np.where(self.law["open"], 0.0, self.law["stiffness"]))
 
 
 # Of a line to which none were added yet.

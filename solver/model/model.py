@@ -6,14 +6,22 @@ by the effects, each of which adds its own through a ``ModelBuilder``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from catenary.meshgen.line import DropperPlace, Slopes, droppers_at
+from catenary.meshgen.line import (
+    Clamps,
+    DropperPlace,
+    Droppers,
+    Slopes,
+    SteadyArms,
+    Supports,
+    droppers_at,
+)
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.wires import Role
 from catenary.solver.model.alike import alike
@@ -212,16 +220,33 @@ class Model:
         """Numbers of one unknown at mesh nodes, shape as ``nodes``; ValueError if one has none."""
         return self.numbering.of(nodes, unknown)
 
+    def droppers_by_group(self) -> Iterator[tuple[Droppers, np.ndarray]]:
+        """Groups of droppers, and which of the mesh's each has, (n_droppers,) bool."""
+        for number, group in enumerate(self.problem.line.droppers):
+            yield group, self.mesh.dropper_group == number
+
+    def arms_by_group(self) -> Iterator[tuple[SteadyArms, np.ndarray]]:
+        """Groups of steady arms, and which of the mesh's each has, (n_arms,) bool."""
+        for number, group in enumerate(self.problem.line.steady_arms):
+            yield group, self.mesh.arm_group == number
+
+    def supports_by_group(self) -> Iterator[tuple[Supports, np.ndarray]]:
+        """Groups of supports and their nodes (n,)."""
+        for number, group in enumerate(self.problem.line.supports):
+            yield group, self.mesh.supports[self.mesh.support_group == number]
+
+    def clamps_by_group(self) -> Iterator[tuple[Clamps, np.ndarray]]:
+        """Groups of clamps, and the nodes (n, 2) that they join."""
+        for number, group in enumerate(self.problem.line.clamps):
+            yield group, self.mesh.clamps[self.problem.line.clamp_group == number]
+
     @cached_property
     def dropper_slopes(self) -> Slopes:
         """Tension over stretch of the droppers, sound ones and broken ones."""
-        groups = [group.kind for group in self.problem.line.droppers]
-        found = np.zeros(
-            (3, self.mesh.droppers.shape[0], max((k.n_pieces for k in groups), default=1))
-        )
-        for number, kind in enumerate(groups):
-            mine = self.mesh.dropper_group == number
-            own = np.stack(kind.slopes_at(self.cut_lengths[mine]))
+        n_pieces = max((group.kind.n_pieces for group in self.problem.line.droppers), default=1)
+        found = np.zeros((3, self.mesh.droppers.shape[0], n_pieces))
+        for group, mine in self.droppers_by_group():
+            own = np.stack(group.kind.slopes_at(self.cut_lengths[mine]))
             # Droppers with fewer pieces repeat their last one.
             found[:, mine] = np.pad(
                 own, ((0, 0), (0, 0), (0, found.shape[2] - own.shape[2])), "edge"

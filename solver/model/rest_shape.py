@@ -84,9 +84,13 @@ class Equilibrium:
     def leaning(self, droppers: np.ndarray) -> np.ndarray:
         """Displacement of the upper ends of ``droppers`` (n, 2) along the track, ahead of that of
         the lower ones, (n,) [m]."""
-        if self.along.size == 0:
-            return np.zeros(len(droppers))
-        return np.asarray(self.along[droppers[:, 0]] - self.along[droppers[:, 1]])
+        upper, lower = self.moved_along(droppers).T
+        return np.asarray(upper - lower)
+
+    def moved_along(self, nodes: int | np.ndarray) -> np.ndarray:
+        """How far nodes have moved along the track since the installation, shape as ``nodes``
+        [m]."""
+        return np.asarray(self.along[nodes] if self.along.size else np.zeros(np.shape(nodes)))
 
     def dropper_vectors(self, droppers: np.ndarray) -> np.ndarray:
         """From lower to upper ends of ``droppers`` (n, 2): along the track, to the left and

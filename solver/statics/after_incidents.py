@@ -41,13 +41,13 @@ import numpy as np
 from catenary.base.errors import InputError, RunBroken
 from catenary.meshgen.mesh import DROPPERS
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import build
+from catenary.solver.effects.build_model import rebuilt
 from catenary.solver.linear.step_operators import LineOperators
 from catenary.solver.linear.unit_responses import Windows, reach
 from catenary.solver.model import beam
 from catenary.solver.model.axial_motion import shape_of, tensioned_ends
 from catenary.solver.model.loads import ShapeLoad
-from catenary.solver.model.matrices import OperatorBands, iterate_sums, whole_matrix
+from catenary.solver.model.matrices import OperatorBands, part_of, whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest_shape import Equilibrium
@@ -98,8 +98,7 @@ def changed_line(first: Model, form: Equilibrium, incidents: Sequence[LineIncide
         else:
             shares[incident.wire] = incident.share
     after = replace(problem, line=problem.line.with_shares(shares))
-    lengths, gap, cut = first.dropper_lengths, first.dropper_gap, first.cut_lengths
-    model = build(after, mesh, lengths, broken, form, gap, cut_lengths=cut)
+    model = rebuilt(first, problem=after, broken=broken, form=form)
     load, energy = np.zeros(model.n_dofs), 0.0
     for wire, now in zip(problem.line.wires, after.line.wires, strict=True):
         pairs = mesh.elements(wire.name)
@@ -145,12 +144,9 @@ def _about_rest(
     if changed.simulated.tensioner is not None and about.along.size:
         # Stops are where they were: displacements count from the first rest.
         ends, along = [end.node for end in tensioned_ends(first)], about.along.copy()
-        along[ends] = form.along[ends] if form.along.size else 0.0
+        along[ends] = form.moved_along(np.array(ends))
         about = replace(about, along=along)
-    lengths, gap, cut = first.dropper_lengths, first.dropper_gap, first.cut_lengths
-    model = build(
-        changed.problem, changed.mesh, lengths, changed.broken, about, gap, cut_lengths=cut
-    )
+    model = rebuilt(changed, form=about)
     unknowns, weights = model.droppers.direction
     k, moved = model.dropper_stiffness, rest.moved
     stretched = k * (weights * moved[unknowns]).sum(axis=1)
@@ -192,8 +188,9 @@ def acceleration_jump(
     first, last = ownership.first, ownership.last
     force = (after.load - before.load)[first:last]
     for line, sign in ((after, 1.0), (before, -1.0)):
-        force -= sign * _times(line.model, ownership, 1.0, 0.0, displacement)
-        force -= sign * _times(line.model, ownership, 0.0, 1.0, velocity)
+        rows, columns = (first, last), (0, displacement.size)
+        for of, values in (((0.0, 1.0, 0.0), displacement), ((0.0, 0.0, 1.0), velocity)):
+            force -= sign * (part_of(line.model, rows, columns, of, 0.0, 1) @ values)
         push = _compensation(line, displacement, velocity)
         force += sign * push[first:last]
     held = after.model.constrained[ownership.owned(after.model.constrained)] - first
@@ -216,19 +213,6 @@ def _compensation(line: ChangedLine, displacement: np.ndarray, velocity: np.ndar
     acts &= reserve[table.leader] < 0.0
     total = np.zeros(line.model.n_dofs)
     np.add.at(total, unknowns[acts], (law["released"] * reserve)[acts, None] * weights[acts])
-    return total
-
-
-def _times(
-    model: Model, ownership: Ownership, stiffness: float, damping: float, values: np.ndarray
-) -> np.ndarray:
-    """Owned rows of (``stiffness`` K + ``damping`` C) ``values``, values (n_dofs,). Not
-    collective."""
-    first, n = ownership.first, ownership.n_local
-    total = np.zeros(n)
-    sums = [(0.0, stiffness, damping)]
-    for rows, columns, (entries,) in iterate_sums(model, first, ownership.last, sums):
-        total += np.bincount(rows - first, weights=entries * values[columns], minlength=n)
     return total
 
 

@@ -14,7 +14,7 @@ from catenary.base.errors import InputError
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import SAME_PLACE, Role
 from catenary.solver.effects.build_model import with_wires_apart
-from catenary.solver.model.link_directions import at_nodes, at_places
+from catenary.solver.model.link_directions import at_places
 from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
 
@@ -98,18 +98,11 @@ def elasticity(model: Model, x_from: float, x_to: float) -> Elasticity:
 
 def _of_stretch(model: Model, stiffness: OperatorBands, x_from: float, x_to: float) -> Elasticity:
     """The lift in a stretch that is solved as a whole."""
-    chains = model.nodes_of(Role.CONTACT)
-    if len(chains) == 1:
-        x = model.mesh.x(chains[0])
-        inside = (x >= x_from - 1e-9) & (x <= x_to + 1e-9)
-        x, places = x[inside], [at_nodes(model, chains[0][inside])]
-        present = np.ones((x.size, 1), dtype=bool)
-    else:
-        x = _places_in(model, x_from, x_to)
-        wires = [wire.name for wire in model.problem.line.wires_of(Role.CONTACT)]
-        places = [at_places(model, wire, x) for wire in wires]
-        present = np.stack([_is_there(model, wire, x) for wire in wires], axis=1)
-        x_from, x_to = _element_ends(model, x_from, x_to)
+    x = _places_in(model, x_from, x_to)
+    wires = [wire.name for wire in model.problem.line.wires_of(Role.CONTACT)]
+    places = [at_places(model, wire, x) for wire in wires]
+    present = np.stack([_is_there(model, wire, x) for wire in wires], axis=1)
+    x_from, x_to = _element_ends(model, x_from, x_to)
     try:
         first, factor = _seen_from(model, stiffness, x_from, x_to)
     except linalg.LinAlgError as error:

@@ -16,29 +16,28 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import linalg as sparse_linalg
 
 from catenary.base.errors import InputError
 from catenary.meshgen.line import Line, SteadyArms
 from catenary.meshgen.mesh import LineMesh, reduced, with_nodes_at
 from catenary.meshgen.wires import SAME_PLACE, Wire
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import build
+from catenary.solver.effects.build_model import build, rebuilt
 from catenary.solver.model.model import Model
 from catenary.solver.model.rest_shape import Equilibrium, LateralShape
+from catenary.solver.model.unknowns import LEVEL, UPRIGHT
 from catenary.solver.problem.problem import Problem
-from catenary.solver.statics.potential import curve_load, dead_loads, exact_moments
-from catenary.solver.statics.repeated_ends import repeated_ends, settled
-from catenary.solver.statics.rest_nearby import StiffLine, errors_of_length, hang
-from catenary.solver.statics.sparse_sum import (
-    BandedFactors,
+from catenary.solver.statics.plane_at_rest import (
+    Followed,
     Part,
+    PlaneAtRest,
     clamp_parts,
-    columns_of,
     springs_between,
-    summed,
     wire_parts,
 )
+from catenary.solver.statics.potential import curve_load, dead_loads, exact_moments
+from catenary.solver.statics.repeated_ends import repeated_ends
+from catenary.solver.statics.rest_nearby import StiffLine, errors_of_length, hang
 
 # Lengths are printed to a tenth of a millimetre; the iteration contracts by the ratio of dropper
 # weight to tension sag, about 1e-3, so that this costs one more pass and leaves no trace in forces.
@@ -183,7 +182,7 @@ def about(model: Model, form: Equilibrium) -> tuple[Model, Equilibrium]:
     problem = model.problem
     if not (effects.needs_form(problem) or effects.move_together(problem) or model.droppers_bend):
         return model, form
-    return build(model.problem, model.mesh, model.dropper_lengths, form=form), form
+    return rebuilt(model, form=form), form
 
 
 def _with_lateral(model: Model, form: Equilibrium, moments: np.ndarray | None) -> Equilibrium:
@@ -218,43 +217,41 @@ class _HangingWires:
     """
 
     def __init__(self, model: Model, exact: bool = False) -> None:
-        self._w = 2 * model.row_of_node
+        self._w = w = 2 * model.row_of_node
         self.moments = exact_moments(model) if exact else None
-        n = 2 * model.mesh.n_nodes
-        parts, self._spring_load = _springs_and_wires(model, self._w, exact)
+        parts, self._spring_load = _springs_and_wires(model, w, exact)
         nodes, heights, held_at = _given_heights(model)
-        self._repeated = repeated_ends(model)
-        ends = self._w[self._repeated.ends]
-        self._at_ends = np.concatenate([ends, ends + 1])
-        self._pulls = columns_of(parts, self._at_ends, n)
-        self._given = np.concatenate([self._w[nodes], ends + 1])
-        heights = np.concatenate([heights, np.zeros(ends.size)])
-        self._heights = np.zeros(n)
-        self._heights[self._given] = heights
+        repeated = repeated_ends(model)
+        ends, masts, level = w[repeated.ends], w[repeated.masts[0]], np.zeros(repeated.rise.size)
         # Without weight the forces of all droppers are zero.
         self._weighted = model.simulated.gravity != 0.0
-        upper, lower = self._w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]].T
-        rows = np.concatenate([self._w[held_at], ends + 1, upper])
-        columns = np.concatenate([self._given, lower])
-        sign = np.repeat([-1.0, 1.0], [self._given.size, upper.size])
-        forces = rows, columns, sign
-        self._factor = BandedFactors(parts, self._given, heights, forces, n)
+        self._plane = PlaneAtRest(
+            parts,
+            np.concatenate([w[nodes], ends + 1]),
+            np.concatenate([heights, level]),
+            np.concatenate([w[held_at], ends + 1]),
+            w[model.mesh.droppers if self._weighted else model.mesh.droppers[:0]],
+            Followed(
+                np.concatenate([ends, ends + 1]),
+                np.concatenate([masts, masts + 1]),
+                np.concatenate([repeated.rise, level]),
+            ),
+            2 * model.mesh.n_nodes,
+        )
 
     def at_rest(self, model: Model, before: Equilibrium | None) -> Equilibrium:
         """The line at rest under the weights of ``model``, which may differ in them only, and under
         what arms lift of their own and a twist of the track pulls in the shape ``before``."""
-        mesh, every = model.mesh, np.arange(model.mesh.n_nodes)
-        load = self._spring_load - self._factor.from_given
+        mesh = model.mesh
         dead = dead_loads(model) + curve_load(model, before)
         if self.moments is not None:
             dead += self.moments
-        load[self._w] += dead[model.dofs(every)]
-        load[self._w + 1] += dead[model.dofs(every, "theta_y")]
+        load = self._spring_load + _in_plane(model, dead, UPRIGHT)
         holding = _holding(model)
         if before is not None and before.lateral is not None:
             at = self._w[mesh.steady_arms[~holding]]
             np.add.at(load, at, before.lateral.arm_force[~holding, 1])
-        solution, held_by = self._solve(load)
+        solution, held_by = self._plane.solve(load)
         height, slope = solution[self._w], solution[self._w + 1]
         n = mesh.droppers.shape[0]
         force = held_by[:n] if self._weighted else np.zeros(n)
@@ -264,23 +261,6 @@ class _HangingWires:
         lift[np.flatnonzero(holding)[by_group]] = held_by[first : first + by_group.size]
         cut = stretched - model.dropper_slopes.stretch_under(force)
         return Equilibrium(height, slope, force, cut, arm_lift=lift)
-
-    def _solve(self, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Heights and slopes (n,) under a load, and the forces by which given ones are held."""
-        given, first = self._given, self._heights[self._at_ends]
-        masts, rise = self._w[self._repeated.masts[0]], self._repeated.rise
-        found = solution = np.zeros(0)
-
-        def turn(values: np.ndarray) -> np.ndarray:
-            nonlocal found, solution
-            found = self._factor.solve(load - self._pulls @ (values - first))
-            solution = found.copy()
-            solution[given] = self._heights[given]
-            solution[self._at_ends] = values
-            return np.concatenate([solution[masts] + rise, solution[masts + 1]])
-
-        settled(turn, first)
-        return solution, found[given]
 
 
 def _holding(model: Model) -> np.ndarray:
@@ -296,14 +276,12 @@ def _springs_and_wires(model: Model, w: np.ndarray, exact: bool) -> tuple[list[P
     relaxed at its height: it gives way under the line's weight. Supports that hold a wire at the
     height wanted do so by an unknown force. Arms are without force at rest.
     """
-    mesh, line = model.mesh, model.problem.line
-    n = 2 * mesh.n_nodes
-    load = np.zeros(n)
-    parts = wire_parts(model, w, exact)
-    for number, supports in enumerate(line.supports):
+    line, parts = model.problem.line, wire_parts(model, w, exact)
+    load = np.zeros(2 * model.mesh.n_nodes)
+    for supports, nodes in model.supports_by_group():
         if supports.holds:
             continue
-        dofs = w[mesh.supports[mesh.support_group == number]]
+        dofs = w[nodes]
         alike = np.zeros(dofs.size, dtype=np.int64)
         parts.append(Part(dofs[:, None], np.full((1, 1, 1), supports.stiffness), alike))
         relaxed = line.wire(supports.wire).points(np.array(supports.x))[:, 2]
@@ -317,12 +295,11 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     which the forces act by which they are held."""
     mesh, line = model.mesh, model.problem.line
     nodes, heights = [mesh.droppers[:, 1]], [np.zeros(mesh.droppers.shape[0])]
-    for number, group in enumerate(line.droppers):
-        mine = mesh.dropper_group == number
+    for group, mine in model.droppers_by_group():
         heights[0][mine] = _wanted(model, line.wire(group.lower), mesh.droppers[mine, 1])
-    for number, arms in enumerate(line.steady_arms):
+    for arms, mine in model.arms_by_group():
         if arms.kind.holds_height:
-            nodes.append(mesh.steady_arms[mesh.arm_group == number])
+            nodes.append(mesh.steady_arms[mine])
             heights.append(_wanted(model, line.wire(arms.wire), nodes[-1]))
     for wire in line.wires:
         nodes.append(mesh.anchors[np.isin(mesh.anchors, mesh.wires[wire.name])])
@@ -331,9 +308,9 @@ def _given_heights(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         else:
             heights.append(_wanted(model, wire, nodes[-1]))
     held_at = list(nodes)
-    for number, supports in enumerate(line.supports):
+    for supports, own in model.supports_by_group():
         if supports.holds:
-            held_at.append(mesh.supports[mesh.support_group == number])
+            held_at.append(own)
             chain = mesh.wires[supports.holds]
             nodes.append(chain[np.searchsorted(mesh.x(chain), mesh.x(held_at[-1]) - SAME_PLACE)])
             heights.append(_wanted(model, line.wire(supports.holds), nodes[-1]))
@@ -425,39 +402,40 @@ def lateral_shape(
     InputError
         If an arm that holds its wire's height has too small a radial force to carry it.
     """
-    mesh = model.mesh
-    at, n = 2 * model.row_of_node, 2 * mesh.n_nodes
+    mesh, at = model.mesh, 2 * model.row_of_node
     upper, lower = mesh.droppers.T
     rise = form.height[upper] - form.height[lower]
     parts = wire_parts(model, at, exact=moments is not None) + clamp_parts(model, at)
     parts.append(springs_between(at[mesh.droppers], form.dropper_force / rise))
-    stiffness, load = summed(parts, n).tocsr(), np.zeros(n)
-    every, pulls = np.arange(mesh.n_nodes), dead_loads(model) + curve_load(model, form)
+    pulls = dead_loads(model) + curve_load(model, form)
     if moments is not None:
         pulls += moments
-    load[at], load[at + 1] = pulls[model.dofs(every, "v")], pulls[model.dofs(every, "theta_z")]
-    nodes, places = _held(model)
-    given = np.zeros(n, dtype=bool)
-    given[at[nodes]] = True
-    course = np.zeros(n)
-    course[at[nodes]] = places
-    repeated = repeated_ends(model)
-    slopes, before = at[repeated.ends] + 1, at[repeated.masts[1]] + 1
-    given[slopes] = True
-    free = np.flatnonzero(~given)
-    factors = sparse_linalg.splu(stiffness[free][:, free].tocsc(), permc_spec="NATURAL")
-
-    def turn(values: np.ndarray) -> np.ndarray:
-        course[free], course[slopes] = 0.0, values
-        course[free] = factors.solve((load - stiffness @ course)[free])
-        return np.asarray(course[before])
-
-    settled(turn, np.zeros(slopes.size))
-    y, slope = course[at], course[at + 1]
-    held_by = (stiffness @ course - load)[at[mesh.steady_arms]]
+    (nodes, places), repeated = _held(model), repeated_ends(model)
+    slopes, level = at[repeated.ends] + 1, np.zeros(repeated.ends.size)
+    given = np.concatenate([at[nodes], slopes])
+    plane = PlaneAtRest(
+        parts,
+        given,
+        np.concatenate([places, level]),
+        given,
+        at[mesh.droppers[:0]],
+        Followed(slopes, at[repeated.masts[1]] + 1, level),
+        2 * mesh.n_nodes,
+    )
+    course, held = plane.solve(_in_plane(model, pulls, LEVEL))
+    held_by = held[np.searchsorted(nodes, mesh.steady_arms)]
     lift = _carried(model, held_by, form.arm_lift)
     arm_force = np.column_stack([held_by, lift, np.zeros(held_by.size)])
-    return LateralShape(y, slope, arm_force)
+    return LateralShape(course[at], course[at + 1], arm_force)
+
+
+def _in_plane(model: Model, loads: np.ndarray, plane: tuple[str, str]) -> np.ndarray:
+    """Loads (n_dofs,) on the unknowns of a plane, deflection and slope of each node in turn."""
+    every, at = np.arange(model.mesh.n_nodes), 2 * model.row_of_node
+    load = np.zeros(2 * every.size)
+    for number, name in enumerate(plane):
+        load[at + number] = loads[model.dofs(every, name)]
+    return load
 
 
 def _held(model: Model) -> tuple[np.ndarray, np.ndarray]:
@@ -465,8 +443,8 @@ def _held(model: Model) -> tuple[np.ndarray, np.ndarray]:
     mesh, line = model.mesh, model.problem.line
     nodes: list[np.ndarray] = []
     places: list[np.ndarray] = []
-    held = [(mesh.steady_arms[mesh.arm_group == i], a.wire) for i, a in enumerate(line.steady_arms)]
-    held += [(mesh.supports[mesh.support_group == i], s.wire) for i, s in enumerate(line.supports)]
+    held = [(mesh.steady_arms[mine], arms.wire) for arms, mine in model.arms_by_group()]
+    held += [(own, supports.wire) for supports, own in model.supports_by_group()]
     for what, name in held:
         nodes.append(what)
         places.append(line.wire(name).points(mesh.x(what))[:, 1])
@@ -481,9 +459,8 @@ def _carried(model: Model, radial: np.ndarray, arm_lift: np.ndarray) -> np.ndarr
     """Vertical force of each arm on its wire, (n_arms,) [N]; ``radial`` (n_arms,) is the lateral
     one [N]."""
     mesh, force = model.mesh, np.zeros(radial.size)
-    for number, arms in enumerate(model.problem.line.steady_arms):
-        mine, kind = mesh.arm_group == number, arms.kind
-        pull = np.abs(radial[mine])
+    for arms, mine in model.arms_by_group():
+        kind, pull = arms.kind, np.abs(radial[mine])
         if kind.length == 0.0:
             continue
         if kind.inclination is not None:

@@ -338,8 +338,7 @@ def tension_along(model: Model, form: Equilibrium) -> tuple[WireAtRest, ...]:
         for i, end in enumerate(ends):
             element = end.element(model.mesh)
             share[i] = tension[element] / installed[element] - 1.0
-            if form.along.size:
-                moved[i] = end.outwards * form.along[end.node]
+            moved[i] = end.outwards * form.moved_along(end.node)
         found.append(WireAtRest(wire.name, x, tension, installed, ends, moved, share))
     return tuple(found)
 

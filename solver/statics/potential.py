@@ -128,11 +128,10 @@ class Potential:
         if not model.simulated.lateral:
             self._parts = [k for k in self._parts if _DROPPER[k] != "v"]
         self._droppers_were = self._pulls(known, known.dropper_force)
-        kinds = [] if known.lateral is None else model.problem.line.steady_arms
         self._arms = [
-            _Arms(model, known, number, arms.kind)
-            for number, arms in enumerate(kinds)
-            if arms.kind.length > 0.0
+            _Arms(model, known, mine, arms.kind)
+            for arms, mine in model.arms_by_group()
+            if arms.kind.length > 0.0 and known.lateral is not None
         ]
 
     def reserve(self, form: Equilibrium) -> np.ndarray:
@@ -153,9 +152,8 @@ class Potential:
             dropper_length=self._cut,
         )
         if "u" in model.unknowns:
-            before = known.along if known.along.size else np.zeros(every.size)
             gained = {wire.name: wire.gained(moved) for wire in self._wires}
-            along = before + moved[model.dofs(every, "u")]
+            along = known.moved_along(every) + moved[model.dofs(every, "u")]
             form = replace(form, along=along, gained_tension=gained)
         if known.lateral is not None:
             force = known.lateral.arm_force.copy()
@@ -207,9 +205,10 @@ class Potential:
         """The rest ``form`` with the forces by which arms without length hold their wires sideways:
         what balances there the loads of the line less those of the known one, ``load`` (n_dofs,)
         [N]; other parameters as of ``pull``."""
-        kinds = self.model.problem.line.steady_arms
-        pinned = [number for number, arms in enumerate(kinds) if arms.kind.length == 0.0]
-        mine = np.flatnonzero(np.isin(self.model.mesh.arm_group, pinned))
+        pinned = np.zeros(self.model.mesh.steady_arms.size, dtype=bool)
+        for arms, own in self.model.arms_by_group():
+            pinned |= own & (arms.kind.length == 0.0)
+        mine = np.flatnonzero(pinned)
         if form.lateral is None or mine.size == 0:
             return form
         at = self.model.dofs(self.model.mesh.steady_arms[mine], "v")
@@ -309,9 +308,9 @@ class _Arms:
     was : forces on the wire at the known rest, as many [N]
     """
 
-    def __init__(self, model: Model, known: Equilibrium, number: int, kind: SteadyArm) -> None:
+    def __init__(self, model: Model, known: Equilibrium, mine: np.ndarray, kind: SteadyArm) -> None:
         assert known.lateral is not None
-        self.mine = model.mesh.arm_group == number
+        self.mine = mine
         nodes = model.mesh.steady_arms[self.mine]
         names = [name for name in _ARM if name in model.unknowns]
         self.unknowns = np.stack([model.dofs(nodes, name) for name in names], axis=1)

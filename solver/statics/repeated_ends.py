@@ -28,12 +28,11 @@ from catenary.solver.problem.problem import Problem
 
 # Change from turn to turn of a line that is settled [m]; one that is round-off of its rest if it
 # falls no more, as of slack lines whose rest is found less exactly.
-_SETTLED, _ROUND_OFF = 1e-14, 1e-11
-# Change of ends from turn to turn that are settled [m], and one that is round-off of rests which
-# Newton's method finds to 1e-9 m, if it falls no more.
-_MOVES_SETTLED, _MOVES_ROUND_OFF = 1e-12, 1e-8
+_OF_PLANE = 1e-14, 1e-11
+# The same of rests which Newton's method finds to 1e-9 m.
+OF_REST = 1e-12, 1e-8
 # Turns at most.
-MOST_TURNS = 40
+_MOST_TURNS = 40
 # Loads that are nothing, over the largest: round-off of droppers of 1e6 N/m.
 _NOTHING = 1e-6
 # Unknowns of each plane, and which mast before the end moves as it does: 0 is the last one.
@@ -77,8 +76,14 @@ def _node_at(model: Model, wire: str, x: float) -> int:
     return int(nodes[at[0]]) if at.size else -1
 
 
-def settled(turn: Callable[[np.ndarray], np.ndarray], first: np.ndarray) -> np.ndarray:
+def settled(
+    turn: Callable[[np.ndarray], np.ndarray],
+    first: np.ndarray,
+    changes: tuple[float, float] = _OF_PLANE,
+) -> np.ndarray:
     """The values that a ``turn`` returns as they are, from ``first`` ones. Not collective.
+
+    ``changes`` are those of values that are settled, and of round-off [m].
 
     Raises
     ------
@@ -86,20 +91,15 @@ def settled(turn: Callable[[np.ndarray], np.ndarray], first: np.ndarray) -> np.n
         If they do not settle.
     """
     values, before = first, np.inf
-    for _ in range(MOST_TURNS):
+    for _ in range(_MOST_TURNS):
         found = turn(values)
         change = np.abs(found - values).max(initial=0.0)
         values = found
         scale = max(1.0, float(np.abs(values).max(initial=0.0)))
-        if change < _SETTLED * scale or before <= change < _ROUND_OFF * scale:
+        if change < changes[0] * scale or before <= change < changes[1] * scale:
             return values
         before = change
-    raise unsettled(change)
-
-
-def unsettled(change: float) -> InputError:
-    """The error of a line whose end changes [m] by as much from turn to turn."""
-    return InputError(
+    raise InputError(
         "the line at rest does not settle where line.ends says that it is periodic: its end still "
         f"moves by {1e3 * change:.2g} mm when it hangs as the span before does; end it otherwise"
     )
@@ -125,10 +125,6 @@ class EndsThatFollow(NamedTuple):
         ends = zip(self.sides, problem.ends, strict=True)
         start, end = (Fixed() if follows else own for follows, own in ends)
         return replace(problem, ends=(start, end))
-
-    def has_settled(self, change: float, before: float) -> bool:
-        """Whether a ``change`` from turn to turn ends them, after one that was ``before`` [m]."""
-        return change < _MOVES_SETTLED or before <= change < _MOVES_ROUND_OFF
 
 
 NO_ENDS = EndsThatFollow(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))

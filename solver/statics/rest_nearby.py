@@ -23,7 +23,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from catenary.base.errors import InputError
 from catenary.solver.effects import all_effects as effects
-from catenary.solver.effects.build_model import build
+from catenary.solver.effects.build_model import build, rebuilt
 from catenary.solver.model.axial_motion import WireEnd, tensioned_ends
 from catenary.solver.model.link_directions import dropper_directions
 from catenary.solver.model.matrices import stiffness_matrix
@@ -32,12 +32,7 @@ from catenary.solver.model.rest_shape import Equilibrium
 from catenary.solver.problem.defects import HardSpot
 from catenary.solver.problem.problem import Problem
 from catenary.solver.statics.potential import Potential, dead_loads
-from catenary.solver.statics.repeated_ends import (
-    MOST_TURNS,
-    NO_ENDS,
-    ends_that_follow,
-    unsettled,
-)
+from catenary.solver.statics.repeated_ends import NO_ENDS, OF_REST, ends_that_follow, settled
 
 # Displacements change by less than this where Newton's method ends [m].
 _SETTLED = 1e-9
@@ -186,21 +181,17 @@ class RestNearby:
         InputError
             If there is none.
         """
-        potential = self._potential
-        moved = np.zeros(self._model.n_dofs)
+        potential, ends, rests = self._potential, self._follow, list[Rest]()
         slack = self._switches & (potential.reserve(potential.known) < -_NO_FORCE)
-        ends, before = self._follow, np.inf
-        for _ in range(MOST_TURNS):
-            rest = self._find(moved, slack)
-            if not ends.ends.size:
-                return rest
-            change = float(np.abs(rest.moved[ends.masts] - moved[ends.ends]).max())
-            if ends.has_settled(change, before):
-                return rest
-            before, moved = change, rest.moved.copy()
-            moved[ends.ends] = moved[ends.masts]
-            slack = rest.gap > 0.0
-        raise unsettled(change)
+
+        def turn(values: np.ndarray) -> np.ndarray:
+            moved = rests[-1].moved.copy() if rests else np.zeros(self._model.n_dofs)
+            moved[ends.ends] = values
+            rests.append(self._find(moved, rests[-1].gap > 0.0 if rests else slack))
+            return rests[-1].moved[ends.masts]
+
+        settled(turn, np.zeros(ends.ends.size), OF_REST)
+        return rests[-1]
 
     def _find(self, moved: np.ndarray, slack: np.ndarray) -> Rest:
         """The rest near a displacement, from droppers that are slack there, with ends that follow
@@ -249,9 +240,7 @@ class RestNearby:
         load = self._load.copy()
         for end in self._ends:
             if end.pull is None:
-                # Place of the known rest, along the track since the installation [m].
-                known = self._potential.known
-                already = float(known.along[end.end.node]) if known.along.size else 0.0
+                already = float(self._potential.known.moved_along(end.end.node))
                 moved[end.unknown] = end.end.outwards * end.held_at - already
             else:
                 tension = model.problem.line.wire(end.end.wire).tension
@@ -266,13 +255,8 @@ class RestNearby:
             about = replace(model, constrained=constrained) if self._follow.ends.size else model
             if self._bends:
                 shape = replace(form, dropper_force=carried)
-                about = build(
-                    self._follow.held(model.problem),
-                    model.mesh,
-                    model.dropper_lengths,
-                    model.broken,
-                    shape,
-                    cut_lengths=model.cut_lengths,
+                about = rebuilt(
+                    model, problem=self._follow.held(model.problem), form=shape, gap=None
                 )
                 about.constrained = constrained
             step = self._solved(about, self._softening(about, form, slack), lacks)
@@ -362,9 +346,8 @@ def hang(
             f"{mesh.x(mesh.droppers[number, 1]):g} m a length of {length[number]:.3f} m: "
             "take smaller errors"
         )
-    wanted = cut.dropper_lengths
     springless = _without_springs(problem)
-    model = build(springless, mesh, length, form=form, cut_lengths=wanted)
+    model = build(springless, mesh, length, form=form, cut_lengths=cut.dropper_lengths)
     potential = Potential(cut, model, form, form.dropper_length + errors)
     if stiff is not None and not same_matrices(stiff.model, model):
         stiff = None
@@ -382,8 +365,7 @@ def hang(
         model.form = rest.form
         if all(map(np.array_equal, dropper_directions(model), model.droppers.direction)):
             return model, rest.form  # no matrix depends on the shape
-    hung = build(problem, mesh, length, form=rest.form, gap=rest.gap, cut_lengths=wanted)
-    return hung, rest.form
+    return rebuilt(model, problem=problem, form=rest.form, gap=rest.gap), rest.form
 
 
 def _without_springs(problem: Problem) -> Problem:

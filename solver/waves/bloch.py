@@ -17,7 +17,7 @@ from scipy import linalg
 
 from catenary.base.errors import InputError
 from catenary.meshgen.wires import Role
-from catenary.solver.model.matrices import whole_matrix
+from catenary.solver.ends import matrices_between
 from catenary.solver.model.model import Model
 
 # Relative difference of the matrices of two spans that counts as none.
@@ -144,28 +144,30 @@ def period_of(model: Model, start: float, end: float) -> Period:
             f"the spans beside that from {start:g} to {end:g} m have other nodes: the waves of a "
             "periodic line need spans that are alike"
         )
-    own, after = slice(starts[1], starts[2]), slice(starts[2], starts[3])
-    parts = []
-    for kind in ({"stiffness": 1.0}, {"mass": 1.0}):
-        whole = whole_matrix(model, **kind).tocsr()
-        mine, joined = whole[own, own].toarray(), whole[own, after].toarray()
-        beside = whole[after, after].toarray()
-        if np.abs(mine - beside).max() > _ALIKE * np.abs(mine).max():
+    first, after, last = starts[1:]
+    mass, _, stiffness = matrices_between(model, first, after, first, last)
+    mass_beside, _, stiffness_beside = matrices_between(model, after, last, after, last)
+    size = after - first
+    for both, beside in ((mass, mass_beside), (stiffness, stiffness_beside)):
+        if np.abs(both[:, :size] - beside).max() > _ALIKE * np.abs(both[:, :size]).max():
             raise InputError(
                 f"the span from {start:g} to {end:g} m is not like the next one: the waves of a "
                 "periodic line need spans that are alike"
             )
-        parts += [mine, joined]
     contact = model.problem.line.wires_of(Role.CONTACT)[0]
     nodes = np.unique(model.mesh.elements(contact.name))
     numbers, x = unknowns.of(nodes, "w"), model.mesh.x(nodes)
     inside = np.flatnonzero((numbers >= starts[1]) & (numbers < starts[2]))
     inside = inside[np.argsort(x[inside])]
-    stiffness, stiffness_next, mass, mass_next = parts
     return Period(
-        length, stiffness, mass, stiffness_next, mass_next,
-        (numbers[inside] - starts[1]).astype(np.int64), x[inside] - start,
-    )  # fmt: skip
+        length,
+        stiffness[:, :size],
+        mass[:, :size],
+        stiffness[:, size:],
+        mass[:, size:],
+        (numbers[inside] - first).astype(np.int64),
+        x[inside] - start,
+    )
 
 
 def bloch_waves(period: Period, highest: float) -> BlochWaves:

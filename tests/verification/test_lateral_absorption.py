@@ -19,7 +19,7 @@ from scenes import load_scene, mesh_of, problem_of, shipped
 
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.effects.effect import Effect
-from catenary.solver.effects.shipped import lateral_effects
+from catenary.solver.effects.shipped import motion_effects
 from catenary.solver.model import switching_links
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.link_directions import sideways_of_droppers
@@ -134,7 +134,7 @@ def measured(row: Row) -> tuple[float, float, float, float]:
     )
     with registered(effect), pytest.MonkeyPatch.context() as patch:
         if not row.pendulums:
-            patch.setattr(lateral_effects, "sideways_of_droppers", without_pull)
+            patch.setattr(motion_effects, "sideways_of_droppers", without_pull)
             patch.setattr(switching_links, "swings_of_droppers", lambda model: [])
         if row._replace(title="", words=()) != Row(""):
             problem = replace(problem, effects=problem.effects | {NAME})

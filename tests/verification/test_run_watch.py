@@ -17,7 +17,7 @@ from small_lines import HANGING, en50318_line, mesh_of, numerics, problem_of, tr
 
 from catenary.meshgen.line import DropperKind
 from catenary.postproc.record.run_watch import RunWatch
-from catenary.solver.effects.shipped.stiff_link_effects import NAME
+from catenary.solver.effects.shipped.line_effects import NAME
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.time_loop.march import March

@@ -9,7 +9,7 @@ from small_lines import BARE, mesh_of, numerics, problem_of, train
 
 from catenary.meshgen.mesh import CONTACT_WIRE
 from catenary.solver.effects.effect import Effect
-from catenary.solver.effects.shipped.axial_effects import CREEP
+from catenary.solver.effects.shipped.motion_effects import CREEP
 from catenary.solver.kernels import native
 from catenary.solver.model.builder import ModelBuilder
 from catenary.solver.model.loads import ShapeLoad

@@ -9,7 +9,7 @@ from axial_lines import ALONG, elastic_line
 from measuring import check, march
 from small_lines import mesh_of, numerics, problem_of, train
 
-from catenary.solver.effects.shipped.axial_effects import moves_along
+from catenary.solver.effects.shipped.motion_effects import moves_along
 from catenary.solver.model.gauges import gauge_places
 from catenary.solver.problem.ends import AlongTrack, Tensioner
 from catenary.solver.problem.watched_links import GAUGES

@@ -24,7 +24,7 @@ from catenary.postproc.report.study_table import Content, StudyTable, file_table
 from catenary.solver.effects.all_effects import simulated
 from catenary.solver.statics.elasticity import elasticity
 from catenary.solver.statics.line_at_rest import LineAtRest
-from catenary.solver.wind import drag_width, gust_points, upward_pressure
+from catenary.solver.wind import GustPressure, drag_width, gust_points
 
 # A figure stands out if it exceeds the median of its likes by this many robust standard deviations
 # (1.4826 times the median absolute deviation) and by this share.
@@ -284,13 +284,14 @@ def gust_forces(rest: LineAtRest, when: Sequence[tuple[float, float, float, floa
         return []
     x = mesh.points[:, 0]
     points = gust_points(wind.gusts.spacing, float(x.min()), float(x.max()))
-    interval, fill = upward_pressure(rest.model, wind, points)
+    pressure = GustPressure(rest.model, wind, points)
     found = []
     for start, end, begin, stop in when:
         first, last = np.searchsorted(points, (start, end)).tolist()
-        low, high = max(round(begin / interval), 0), round(stop / interval)
+        low = max(round(begin / pressure.interval), 0)
+        high = round(stop / pressure.interval)
         slices = np.zeros((high - low + 1, last - first))
-        fill(low, slice(first, last), slices)
+        pressure.fill(False, low, slice(first, last), slices)
         area = 0.0
         for wire in rest.problem.line.wires:
             for nodes in mesh.pieces(wire.name):

@@ -1,1 +1,1 @@
-"""The effects that are shipped: a file for each group, registered when it is imported."""
+"""The effects that are shipped: tables of them by subject, registered by `all_effects.py`."""

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from catenary.meshgen.line import Line
-from catenary.solver.effects.effect import Effect, register
-from catenary.solver.effects.shipped import hardware_effects  # noqa: F401  (built before)
+from catenary.solver.effects.effect import Effect
 from catenary.solver.model.link_directions import at_places
-from catenary.solver.model.model import Block
 from catenary.solver.problem.defects import (
     BentWire,
     HardSpot,
@@ -24,7 +22,52 @@ from catenary.solver.problem.defects import (
 )
 from catenary.solver.problem.problem import Problem, Simulated
 
-register(
+if TYPE_CHECKING:
+    from catenary.solver.model.builder import ModelBuilder
+
+_Kind = TypeVar("_Kind")
+
+
+def _of_kind(problem: Problem, kind: type[_Kind]) -> Iterator[_Kind]:
+    return (defect for defect in problem.defects if isinstance(defect, kind))
+
+
+def _has(kind: type) -> Callable[[Problem], bool]:
+    return lambda problem: any(True for _ in _of_kind(problem, kind))
+
+
+def _worn(line: Line, problem: Problem) -> Line:
+    worn = list(_of_kind(problem, WornWire))
+    wires = (
+        replace(wire, worn=tuple((d.start, d.end, d.lost) for d in worn if d.wire == wire.name))
+        for wire in line.wires
+    )
+    return replace(line, wires=tuple(wires))
+
+
+def _hard_spots(builder: ModelBuilder) -> None:
+    for spot in _of_kind(builder.problem, HardSpot):
+        place = at_places(builder.model, spot.wire, np.array([spot.x]))
+        if spot.mass:
+            builder.add_masses_at(spot.wire, place, np.array([spot.mass]))
+        if spot.stiffness:
+            spring = place.matrices(np.array([spot.stiffness]))
+            builder.add_elements(spot.wire, place.unknowns, stiffness=spring)
+
+
+def _kinks(laws: Simulated, problem: Problem) -> Simulated:
+    bent = []
+    for kink in _of_kind(problem, Kink):
+        wire = problem.line.wire(kink.wire)
+        decay = float(np.sqrt(wire.bending_stiffness / wire.tension))
+        # A worn wire straightens over less; where wear begins beside the kink, the mean counts.
+        _, left = wire.left_of(kink.x + decay * np.array([[-1.0, 1.0]]))
+        decay *= float(np.sqrt(left[0]))
+        bent.append(BentWire(kink.wire, kink.x, kink.angle, decay))
+    return replace(laws, surface=(*laws.surface, *bent))
+
+
+DEFECTS = (
     Effect(
         "contact_wire_height",
         "irregular heights of the contact wires at their droppers",
@@ -59,55 +102,6 @@ register(
             laws, surface=(*laws.surface, *filter(None, [p.irregularities.surface]))
         ),
     ),
-)
-
-
-if TYPE_CHECKING:
-    from catenary.solver.model.builder import ModelBuilder
-
-_Kind = TypeVar("_Kind")
-
-
-def _of_kind(problem: Problem, kind: type[_Kind]) -> Iterator[_Kind]:
-    return (defect for defect in problem.defects if isinstance(defect, kind))
-
-
-def _has(kind: type) -> Callable[[Problem], bool]:
-    return lambda problem: any(True for _ in _of_kind(problem, kind))
-
-
-def _worn(line: Line, problem: Problem) -> Line:
-    worn = list(_of_kind(problem, WornWire))
-    wires = (
-        replace(wire, worn=tuple((d.start, d.end, d.lost) for d in worn if d.wire == wire.name))
-        for wire in line.wires
-    )
-    return replace(line, wires=tuple(wires))
-
-
-def _hard_spots(builder: ModelBuilder) -> None:
-    for spot in _of_kind(builder.problem, HardSpot):
-        place = at_places(builder.model, spot.wire, np.array([spot.x]))
-        if spot.mass:
-            builder.add_masses_at(spot.wire, place, np.array([spot.mass]))
-        if spot.stiffness:
-            spring = spot.stiffness * place.weights[:, :, None] * place.weights[:, None, :]
-            builder.add_block(Block.of_elements(spot.wire, place.unknowns, stiffness=spring))
-
-
-def _kinks(laws: Simulated, problem: Problem) -> Simulated:
-    bent = []
-    for kink in _of_kind(problem, Kink):
-        wire = problem.line.wire(kink.wire)
-        decay = float(np.sqrt(wire.bending_stiffness / wire.tension))
-        # A worn wire straightens over less; where wear begins beside the kink, the mean counts.
-        _, left = wire.left_of(kink.x + decay * np.array([[-1.0, 1.0]]))
-        decay *= float(np.sqrt(left[0]))
-        bent.append(BentWire(kink.wire, kink.x, kink.angle, decay))
-    return replace(laws, surface=(*laws.surface, *bent))
-
-
-register(
     Effect(
         "missing_dropper",
         "droppers that are missing from the start",

@@ -6,7 +6,7 @@ import numpy as np
 from small_lines import HANGING, ac_simple_line, mesh_of, problem_of
 
 from catenary.solver.effects.build_model import build
-from catenary.solver.effects.shipped.end_effects import layer_damping
+from catenary.solver.effects.shipped.motion_effects import layer_damping
 from catenary.solver.model.matrices import whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import AbsorbingLayer, EndCondition, Fixed

@@ -10,7 +10,13 @@ from measuring import COMM, matrix_of
 from small_lines import HANGING, ac_simple_line, mesh_of, problem_of
 
 from catenary.solver.linear.station_rows import LikeStations
-from catenary.solver.linear.unit_responses import ShortColumns, UnitResponses, Windows, reach
+from catenary.solver.linear.unit_responses import (
+    Forces,
+    ShortColumns,
+    UnitResponses,
+    Windows,
+    reach,
+)
 from catenary.solver.model import matrices
 from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
@@ -44,7 +50,9 @@ def columns_of(model: Model) -> tuple[ShortColumns, np.ndarray]:
     dofs = np.stack([model.dofs(nodes), model.dofs(nodes, "theta_y")], axis=1)
     free = np.ones(model.n_dofs)
     free[model.constrained] = 0.0
-    return responses.columns(dofs[:, :, None], free[dofs][:, :, None], model.mesh.x(nodes)), dofs
+    x = model.mesh.x(nodes)
+    forces = Forces(dofs[:, :, None], free[dofs][:, :, None], x, np.zeros(x.size))
+    return responses.columns(forces), dofs
 
 
 def rows_of_stations(model: Model) -> list[np.ndarray]:

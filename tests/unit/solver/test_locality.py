@@ -25,7 +25,7 @@ from small_lines import (
 from catenary import RunBroken
 from catenary.solver.effects.build_model import build
 from catenary.solver.integrators.line_integrator import LineIntegrator
-from catenary.solver.linear.unit_responses import DECAY, UnitResponses, Windows, reach
+from catenary.solver.linear.unit_responses import DECAY, Forces, UnitResponses, Windows, reach
 from catenary.solver.model.matrices import OperatorBands
 from catenary.solver.model.model import Model
 from catenary.solver.model.unknowns import Unknowns
@@ -125,7 +125,8 @@ def test_short_columns_are_the_columns_of_full_solves(stepper: LineIntegrator) -
     ends = model.dofs(model.mesh.droppers)
     x = model.mesh.x(model.mesh.droppers[:, 1])
     pair = np.broadcast_to(np.array([1.0, -1.0]), ends.shape)
-    found = stepper.responses.columns(ends[:, None], pair[:, None], x)
+    forces = Forces(ends[:, None], pair[:, None], x, np.zeros(x.size))
+    found = stepper.responses.columns(forces)
     coefficients = (1.0, stepper.position_factor, stepper.velocity_factor)
     exact = inverse_columns(model, coefficients, ends[:, 0])
     exact -= inverse_columns(model, coefficients, ends[:, 1])
@@ -153,7 +154,7 @@ def test_columns_that_leak_are_refused(stepper: LineIntegrator) -> None:
         COMM, model, stepper.ownership, OperatorBands(model, coefficients), too_short
     )
     with pytest.raises(RunBroken, match=r"does not decay within 4 m.*numerics\.dt_s"):
-        responses.columns(dofs[:, None], ones, x)
+        responses.columns(Forces(dofs[:, None], ones, x, np.zeros(x.size)))
 
 
 def test_windows_hold_all_unknowns_within_reach() -> None:

@@ -30,10 +30,11 @@ def test_columns_of_long_reach_end_where_forces_are_felt(
     made = make_line(COMM, found, distribute(found, 1, 0), numerics(1e-3), True)
     nodes = found.mesh.wires["contact_wire"][20:120:9]
     dofs = found.dofs(nodes)[:, None, None]
-    given = dofs, np.ones(dofs.shape), found.mesh.x(nodes)
-    short = made.responses.columns(*given)
+    x = found.mesh.x(nodes)
+    given = unit_responses.Forces(dofs, np.ones(dofs.shape), x, np.zeros(x.size))
+    short = made.responses.columns(given)
     monkeypatch.setattr(unit_responses, "_LONG", np.inf)
-    whole = made.responses.columns(*given)
+    whole = made.responses.columns(given)
     assert short.reach <= whole.reach and short.data.size <= whole.data.size
     for place in range(nodes.size):
         columns = []

@@ -10,7 +10,7 @@ from small_lines import WHOLE, en50318_line, mesh_of, numerics, problem_of
 
 from catenary.meshgen.line import DropperKind
 from catenary.solver.effects.all_effects import active, simulated
-from catenary.solver.effects.shipped.stiff_link_effects import NAME, STIFF
+from catenary.solver.effects.shipped.line_effects import NAME, STIFF
 from catenary.solver.model.model import Model
 from catenary.solver.problem.problem import Damping, Problem
 from catenary.solver.problem.watched_links import UPLIFT_STOPS

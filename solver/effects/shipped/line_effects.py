@@ -1,22 +1,52 @@
-"""Effects in the vertical plane: wires and what hangs and holds them, droppers to incidents."""
+"""Effects in the vertical plane: wires, what hangs and holds them, hardware, incidents.
+
+One-sided links that are stiff for the time step have numerical damping.
+
+Average acceleration reflects the force of a spring with omega dt >> 1 from step to step (its
+amplification factor goes to -1) and does the work (T_n + T_n+1) / 2 times the stretch of a step. A
+link that slackens from a stretch a to a gap b thereby returns k a (a + b) / 2, though only
+k a^2 / 2 was stored, and a stiff link switches in every other step: the line gains energy. A damper
+alpha k in the link makes the factor (2 alpha - dt) / (2 alpha + dt): with alpha = dt it is 1/3, and
+a link that slackens returns less than it stored (docs/theory/droppers.md).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catenary.base.errors import InputError
 from catenary.meshgen.wires import Profile
-from catenary.solver.effects.effect import Effect, Limit, register
+from catenary.solver.effects.effect import Effect, Limit
+from catenary.solver.model.link_directions import at_nodes, at_places
+from catenary.solver.model.links import PULLS, law
 from catenary.solver.model.unknowns import UPRIGHT
 from catenary.solver.problem.contact_laws import KinematicLaw
 from catenary.solver.problem.defects import DropperBreak, LineIncident, TensionLoss
-from catenary.solver.problem.problem import Problem, Simulated, TargetHeight, slowest_wave_speed
+from catenary.solver.problem.problem import (
+    Damping,
+    Problem,
+    Simulated,
+    TargetHeight,
+    slowest_wave_speed,
+)
+from catenary.solver.problem.watched_links import UPLIFT_STOPS
 
 if TYPE_CHECKING:
     from catenary.meshgen.line import SteadyArms
     from catenary.solver.model.builder import ModelBuilder
+
+# Lift that no wire gets to [m].
+_OUT_OF_REACH = 1e3
+NAME = "stiff_link_damping"
+# A link is stiff from k dt^2 = 4 kappa m on, with some 0.25 kg of wire that move with its ends
+# within a step: kappa = 0.2. Undamped lines gained energy at 0.25, over 4 km (docs/hard_cases.md).
+STIFF = 0.22  # k dt^2 [N s2/m]
+# Length of droppers whose stiffness goes with it and which are not cut yet, a short one [m].
+_SHORT = 0.3
 
 
 def pre_sag(wanted: Profile, x: np.ndarray) -> np.ndarray:
@@ -30,59 +60,53 @@ def transition(wanted: Profile, x: np.ndarray) -> np.ndarray:
 
 
 def _vertical(builder: ModelBuilder) -> None:
-    mesh, line = builder.mesh, builder.problem.line
-    for wire in reversed(line.wires):
+    for wire in reversed(builder.problem.line.wires):
         builder.add_wire(wire.name)
     builder.add_droppers()
-    for number, supports in enumerate(line.supports):
-        nodes = mesh.supports[mesh.support_group == number]
+    for supports, nodes in builder.model.supports_by_group():
         builder.add_springs(supports.name, nodes, "w", supports.stiffness)
     builder.add_clamps("w")
     builder.hold(builder.held_ends, "w")
 
 
 def _dropper_mass(builder: ModelBuilder) -> None:
-    mesh = builder.mesh
-    for number, droppers in enumerate(builder.problem.line.droppers):
-        mine = mesh.dropper_group == number
-        half = 0.5 * droppers.kind.mass_per_length * builder.model.cut_lengths[mine]
-        half[builder.model.missing[mine]] = 0.0
+    model = builder.model
+    for droppers, mine in model.droppers_by_group():
+        half = 0.5 * droppers.kind.mass_per_length * model.cut_lengths[mine]
+        half[model.missing[mine]] = 0.0
         for side in (0, 1):
-            builder.add_masses(droppers.name, mesh.droppers[mine, side], half)
+            builder.add_masses(droppers.name, model.mesh.droppers[mine, side], half)
 
 
 def _clamp_mass(builder: ModelBuilder) -> None:
-    mesh = builder.mesh
-    for number, droppers in enumerate(builder.problem.line.droppers):
-        mine = mesh.dropper_group == number
-        upper, lower = mesh.droppers[mine].T
-        there = 1.0 - builder.model.missing[mine]
+    model = builder.model
+    for droppers, mine in model.droppers_by_group():
+        upper, lower = model.mesh.droppers[mine].T
+        there = 1.0 - model.missing[mine]
         builder.add_masses(droppers.upper, upper, droppers.kind.upper_clamp_mass * there)
         builder.add_masses(droppers.lower, lower, droppers.kind.lower_clamp_mass * there)
-    for number, clamps in enumerate(builder.problem.line.clamps):
-        pairs = mesh.clamps[builder.problem.line.clamp_group == number]
+    for clamps, pairs in model.clamps_by_group():
         for name, side in ((clamps.upper, 0), (clamps.lower, 1)):
             builder.add_masses(name, pairs[:, side], 0.5 * clamps.mass)
 
 
 def _arm_inertia(builder: ModelBuilder) -> None:
-    mesh = builder.mesh
-    for number, arms in enumerate(builder.problem.line.steady_arms):
-        nodes, clamp = mesh.steady_arms[mesh.arm_group == number], arms.kind.clamp_mass
+    model = builder.model
+    for arms, mine in model.arms_by_group():
+        nodes, clamp = model.mesh.steady_arms[mine], arms.kind.clamp_mass
         rod = arms.kind.mass_per_length * arms.kind.length
         # A rod hinged at its far end: a third of its mass moves with the wire, half of it hangs.
         builder.add_masses(arms.name, nodes, rod / 3 + clamp, hanging_mass=rod / 2 + clamp)
-        builder.model.hanging_at_arms[mesh.arm_group == number] = rod / 2 + clamp
+        model.hanging_at_arms[mine] = rod / 2 + clamp
 
 
 def _arm_stiffness(builder: ModelBuilder) -> None:
-    mesh = builder.mesh
-    for number, arms in enumerate(builder.problem.line.steady_arms):
-        if arms.kind.length > 0.0 and builder.model.simulated.lateral:
+    model = builder.model
+    for arms, mine in model.arms_by_group():
+        if arms.kind.length > 0.0 and model.simulated.lateral:
             continue  # a bar, whose stiffness follows from its radial force
-        nodes = mesh.steady_arms[mesh.arm_group == number]
         stiffness = arms.vertical_stiffness(builder.problem.line.wire(arms.wire))
-        builder.add_springs(arms.name, nodes, "w", stiffness)
+        builder.add_springs(arms.name, model.mesh.steady_arms[mine], "w", stiffness)
 
 
 def _is_bar(problem: Problem, arms: SteadyArms) -> bool:
@@ -127,7 +151,7 @@ def _happening(laws: Simulated, problem: Problem, kind: type[LineIncident]) -> S
     return replace(laws, incidents=tuple(chosen))
 
 
-register(
+VERTICAL = (
     Effect(
         "vertical",
         "vertical motion of the tensioned wires",
@@ -341,4 +365,114 @@ register(
         lifts=(Limit.WAVE_SPEED,),
         data="a train.speed_km_h at or above the contact wire's wave speed",
     ),
+)
+
+
+def _fittings(builder: ModelBuilder) -> None:
+    for fittings in builder.problem.line.fittings:
+        place = at_places(builder.model, fittings.wire, np.array(fittings.x))
+        builder.add_masses_at(fittings.wire, place, np.array(fittings.mass))
+
+
+def _stops(builder: ModelBuilder) -> None:
+    """Open links to the ground; an arm without a stop has one that it does not reach.
+
+    Stops stay where they were installed, whatever has raised or lowered the wire since.
+    """
+    mesh, model = builder.mesh, builder.model
+    gap, stiffness = np.full(mesh.steady_arms.size, _OUT_OF_REACH), np.ones(mesh.steady_arms.size)
+    for arms, own in model.arms_by_group():
+        if arms.kind.uplift_stop is not None:
+            gap[own], stiffness[own] = arms.kind.uplift_stop, arms.kind.stop_stiffness
+    if model.form is not None and model.form.arm_raised.size:
+        gap -= model.form.arm_raised
+        _refuse_pushed(builder, gap)
+    laws = law(mesh.x(mesh.steady_arms), stiffness, acts=PULLS, gap=gap)
+    builder.add_links(UPLIFT_STOPS, at_nodes(model, mesh.steady_arms), laws)
+
+
+def _refuse_pushed(builder: ModelBuilder, gap: np.ndarray) -> None:
+    """Refuse a line that rests on a stop: a wire that is higher than stops allow was hung wrong."""
+    if (gap >= 0.0).all():
+        return
+    mesh, form = builder.mesh, builder.model.form
+    assert form is not None
+    worst = int(np.argmin(gap))
+    arms = builder.problem.line.steady_arms[mesh.arm_group[worst]]
+    raise InputError(
+        f"line.steady_arm.uplift_stop_m is {arms.kind.uplift_stop:g} m, but the steady arm at "
+        f"{mesh.x(mesh.steady_arms[worst]):g} m rests {form.arm_raised[worst]:.3f} m above its "
+        "place at the installation: take a larger one, or less of what raises the wire "
+        "(defects, irregularities, temperature, wind)"
+    )
+
+
+HARDWARE = (
+    Effect(
+        "uplift_stops",
+        "stops that end the uplift at steady arms",
+        "a link for each arm that pushes its wire down beyond a lift",
+        "linear complementarity with a gap, one way",
+        data="line.steady_arm.uplift_stop_m",
+        applies=lambda p: any(arms.kind.uplift_stop is not None for arms in p.line.steady_arms),
+        build=_stops,
+        components=(UPLIFT_STOPS,),
+        law=lambda laws, p: replace(laws, uplift_stops=True),
+    ),
+    Effect(
+        "fittings",
+        "section insulators and other fittings on the wires",
+        "lumped masses at places of wires, for which droppers are cut; [[line.fittings]]",
+        "consistent mass and weight at the place within its element",
+        data="line.fittings",
+        applies=lambda p: bool(p.line.fittings),
+        build=_fittings,
+    ),
+)
+
+
+def _one_sided(problem: Problem) -> Iterator[tuple[str, float]]:
+    """Components whose links act one way, and the largest stiffness of each [N/m]."""
+    line = problem.line
+    if "dropper_slackening" in problem.effects:
+        for group in line.droppers:
+            yield group.name, group.kind.stiffest_at(_SHORT)
+    if "uplift_stops" in problem.effects:
+        kinds = [arms.kind for arms in line.steady_arms if arms.kind.uplift_stop is not None]
+        if kinds:
+            yield UPLIFT_STOPS, max(kind.stop_stiffness for kind in kinds)
+
+
+def _given(problem: Problem) -> Damping:
+    return problem.damping if "structural_damping" in problem.effects else Damping(0.0, 0.0)
+
+
+def _added(problem: Problem) -> dict[str, float]:
+    """Alpha [s] by component that its links lack to have dt."""
+    given, dt = _given(problem), problem.numerics.dt
+    found = {}
+    for name, stiffness in _one_sided(problem):
+        alpha, _ = given.per_component.get(name, (given.alpha, given.beta))
+        if stiffness * dt**2 > STIFF and alpha < dt:
+            found[name] = dt - alpha
+    return found
+
+
+def _damped(laws: Simulated, problem: Problem) -> Simulated:
+    own, added = laws.damping, _added(problem)
+    pairs = dict(own.per_component)
+    for name, more in added.items():
+        alpha, beta = pairs.get(name, (own.alpha, own.beta))
+        pairs[name] = alpha + more, beta
+    return replace(laws, damping=replace(own, per_component=pairs), added_alpha=added)
+
+
+STIFF_LINKS = Effect(
+    NAME,
+    "numerical damping of droppers and stops that are stiff for the time step",
+    "a damper alpha k in each link that acts one way, with alpha = dt",
+    "amplification factor of average acceleration for omega dt >> 1; docs/theory/droppers.md",
+    applies=lambda p: bool(_added(p)),
+    law=_damped,
+    data="droppers that slacken, or stops, with k dt^2 above 0.22 N s2/m and less damping",
 )

@@ -1,4 +1,4 @@
-"""Sparse matrices in one plane of a line at rest: summed over elements, factored in bands.
+"""One plane of a line at rest: stiffness summed over elements, factored in bands, and solved with.
 
 Factors in bands are little more than the numbers of the matrix. Those of a sparse matrix of some
 hundred thousand nodes take several times the memory.
@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 from scipy.linalg import lapack
 
 from catenary.base.errors import InputError
 from catenary.solver.model import beam
 from catenary.solver.model.alike import alike
 from catenary.solver.model.model import Model
+from catenary.solver.statics.repeated_ends import settled
 
 # Elements whose matrices are summed at once.
 _AT_ONCE = 1 << 10
@@ -75,52 +75,32 @@ def springs_between(dofs: np.ndarray, stiffness: np.ndarray | float) -> Part:
 
 def clamp_parts(model: Model, at: np.ndarray) -> list[Part]:
     """Clamps of one wire on another, which hold both ways; ``at`` as in ``wire_parts``."""
-    line, parts = model.problem.line, []
-    for number, clamps in enumerate(line.clamps):
-        pairs = at[model.mesh.clamps[line.clamp_group == number]]
-        parts.append(springs_between(pairs, clamps.stiffness))
-    return parts
+    return [springs_between(at[pairs], own.stiffness) for own, pairs in model.clamps_by_group()]
 
 
-def summed(parts: list[Part], size: int) -> sparse.csc_matrix:
-    """The matrix (size, size) of all parts."""
-    matrices = [part.matrices[part.kind] for part in parts]
-    at = [
-        np.concatenate(
-            [
-                np.broadcast_to(part.dofs[axes], own.shape).ravel()
-                for part, own in zip(parts, matrices, strict=True)
-            ]
-        )
-        for axes in (np.s_[:, :, None], np.s_[:, None, :])
-    ]
-    values = np.concatenate([own.ravel() for own in matrices])
-    return sparse.csc_matrix((values, (at[0], at[1])), shape=(size, size))
+class Followed(NamedTuple):
+    """Given unknowns, ``ends``, that move as others, ``masts``, do, and stand ``rise`` [m] higher,
+    (k,) each."""
+
+    ends: np.ndarray
+    masts: np.ndarray
+    rise: np.ndarray
 
 
-def columns_of(parts: list[Part], columns: np.ndarray, size: int) -> sparse.csc_matrix:
-    """Some columns (size, k) of the matrix of all parts."""
-    near = []
-    for part in parts if columns.size else ():
-        near.append(part.only(np.isin(part.dofs, columns).any(axis=1)))
-    return summed(near, size)[:, columns] if near else sparse.csc_matrix((size, columns.size))
+class PlaneAtRest:
+    """The wires of a line in one plane between what holds them, factored. Not collective.
 
-
-class BandedFactors:
-    """Factors of a banded matrix (n, n). Not collective.
-
-    The value of a ``given`` unknown is known and its force is not: the column of the unknown holds
-    the entries ``forces`` in place of those of the parts.
-
-    Attributes
-    ----------
-    from_given : (n,) sum of all parts times the values of the given unknowns
+    Unknowns are deflection and slope of each node. Where one is given, the force that holds the
+    wire there is unknown in its place. Ends that follow masts are found by turns.
 
     Parameters
     ----------
-    parts : summands of the matrix
-    given, values : (m,) numbers of the given unknowns, and their values
-    forces : rows, columns and entries (k,) of the columns of given unknowns
+    parts : summands of the stiffness (n, n)
+    given, values : (m,) numbers of given unknowns, and their values
+    held_at : (m,) unknowns on which the forces act that hold the given ones
+    droppers : (k, 2) upper and lower ends of what holds a given lower end with its force, and is
+        pulled by it at the upper one
+    followed : ends among the given unknowns that follow others
     size : n
 
     Raises
@@ -134,29 +114,27 @@ class BandedFactors:
         parts: Sequence[Part],
         given: np.ndarray,
         values: np.ndarray,
-        forces: tuple[np.ndarray, np.ndarray, np.ndarray],
+        held_at: np.ndarray,
+        droppers: np.ndarray,
+        followed: Followed,
         size: int,
     ) -> None:
-        rows, columns, numbers = forces
-        reach = int(np.abs(rows - columns).max(initial=0))
-        for part in parts:
-            reach = max(reach, int(np.ptp(part.dofs, axis=1).max(initial=0)))
-        self._reach = reach
-        free, known = np.ones(size, dtype=bool), np.zeros(size)
-        free[given], known[given] = False, values
-        self.from_given = np.zeros(size)
+        self._given, self._followed, self._known = given, followed, np.zeros(size)
+        self._known[given] = values
+        rows = np.concatenate([held_at, droppers[:, 0]])
+        columns = np.concatenate([given, droppers[:, 1]])
+        sign = np.repeat([-1.0, 1.0], [given.size, len(droppers)])
+        reaches = [np.abs(rows - columns), *(np.ptp(part.dofs, axis=1) for part in parts)]
+        self._reach = reach = int(np.concatenate(reaches).max(initial=0))
+        free = np.ones(size, dtype=bool)
+        free[given] = False
+        self._beside = [part.only(~free[part.dofs].all(axis=1)) for part in parts]
         bands = np.zeros((3 * reach + 1, size), order="F")
         for part in parts:
             for first in range(0, len(part.dofs), _AT_ONCE):
-                dofs = part.dofs[first : first + _AT_ONCE]
-                matrices = part.matrices[part.kind[first : first + _AT_ONCE]]
-                at = np.flatnonzero(~free[dofs].all(axis=1))
-                if at.size:
-                    forces_there = np.einsum("eij,ej->ei", matrices[at], known[dofs[at]])
-                    np.add.at(self.from_given, dofs[at], forces_there)
-                    matrices[at] *= free[dofs[at]][:, None]
-                _add(bands, dofs, matrices)
-        np.add.at(bands, (2 * reach + rows - columns, columns), numbers)
+                some = part.only(slice(first, first + _AT_ONCE))
+                _add(bands, some.dofs, some.matrices[some.kind] * free[some.dofs][:, None])
+        np.add.at(bands, (2 * reach + rows - columns, columns), sign)
         self._factors, self._pivots, info = lapack.dgbtrf(bands, reach, reach, overwrite_ab=True)
         if info != 0:
             raise InputError(
@@ -165,11 +143,30 @@ class BandedFactors:
                 "with holds, at clamps and at ends"
             )
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """The solution (n,) for a right-hand side (n,)."""
-        reach = self._reach
-        solution, _ = lapack.dgbtrs(self._factors, reach, reach, right, self._pivots)
-        return np.asarray(solution)
+    def solve(self, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The unknowns (n,) under a load (n,), and the forces (m,) by which given ones are held."""
+        known, reach, (ends, masts, rise) = self._known.copy(), self._reach, self._followed
+        found = solution = known
+
+        def turn(values: np.ndarray) -> np.ndarray:
+            nonlocal found, solution
+            known[ends] = values
+            right = load - self._pull(known)
+            found, _ = lapack.dgbtrs(self._factors, reach, reach, right, self._pivots)
+            solution = found.copy()
+            solution[self._given] = known[self._given]
+            return np.asarray(solution[masts] + rise)
+
+        settled(turn, known[ends])
+        return solution, found[self._given]
+
+    def _pull(self, known: np.ndarray) -> np.ndarray:
+        """Forces (n,) by given unknowns alone, ``known`` (n,) with zeros elsewhere."""
+        total = np.zeros(known.size)
+        for part in self._beside:
+            own = np.einsum("eij,ej->ei", part.matrices[part.kind], known[part.dofs])
+            np.add.at(total, part.dofs, own)
+        return total
 
 
 def _add(bands: np.ndarray, dofs: np.ndarray, matrices: np.ndarray) -> None:
