@@ -334,9 +334,8 @@ def test_margins_have_the_sign_of_their_bounds() -> None:
     margins = margins_of(run, bounds)
     assert margins == {"min_N >= 15": [-3.0], "std_N <= 30": [10.0]}
     assert least([margins, {"": [-np.inf]}], "std_N <= 30") == -np.inf
-    run["acceptance"].append(
-        {"criterion": "least", "value": 5.0, "limit": 0.0, "relation": ">", "passed": True}
-    )
+    own = {"criterion": "least", "value": 5.0, "unit": "N"}
+    run["acceptance"].append({**own, "limit": 0.0, "relation": ">", "passed": True})
     assert margins_of(run, []) == {"deviation": [10.0], "least": [5.0]}
 
 
