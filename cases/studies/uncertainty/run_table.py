@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -68,6 +68,12 @@ class RunTable(NamedTuple):
         if statistic in {column.name for column in OF_LINE}:
             return {"": done.drop_duplicates("variant")}
         return {str(name): rows for name, rows in done.groupby("pantograph", sort=False)}
+
+    def figures(self) -> Iterator[tuple[dict[str, str], pd.DataFrame]]:
+        """Each statistic with each pantograph, by "statistic" and "pantograph", and their rows."""
+        for statistic in self.statistics:
+            for pantograph, rows in self.of(statistic).items():
+                yield {"statistic": statistic, "pantograph": pantograph}, rows
 
     @property
     def runs(self) -> pd.DataFrame:
