@@ -22,14 +22,14 @@ from catenary import InputError
 from catenary.cases.run.prepared import rest_of, sound_rest
 from catenary.cases.scene.load import recorded_scene
 from catenary.cases.scene.scene import resolved
-from catenary.cases.studies.sensitivity.derivatives import (
+from catenary.cases.studies.parameters.derivatives import (
     Sensitivity,
     as_text,
     change_by,
     sensitivity_of,
     table_of,
 )
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
+from catenary.cases.studies.parameters.parameters import ChangedScenes, Parameter
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.tangents.march import march_with_tangents

@@ -18,17 +18,17 @@ from scenes import Scene, load_scene, problem_of
 from scipy import stats
 from twin_passages import filtered_noise, write_measurement
 
-from catenary.cases.studies.identification.measurement import Measurement, Task
-from catenary.cases.studies.identification.output import as_text, verdict
-from catenary.cases.studies.identification.posterior import innovations_of, judge, posterior_of
-from catenary.cases.studies.identification.study import (
+from catenary.cases.studies.measured import read_table
+from catenary.cases.studies.parameters.identification import (
     FittedMarch,
     Identification,
     Unknown,
     identify,
 )
-from catenary.cases.studies.measured import read_table
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes
+from catenary.cases.studies.parameters.identified import as_text, verdict
+from catenary.cases.studies.parameters.measurement import Measurement, Task
+from catenary.cases.studies.parameters.parameters import ChangedScenes
+from catenary.cases.studies.parameters.posterior import innovations_of, judge, posterior_of
 from catenary.cases.studies.task_files import read_task
 
 FORCE_NOISE, HEIGHT_NOISE = 5.0, 5e-3

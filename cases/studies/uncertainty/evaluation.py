@@ -17,9 +17,14 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from catenary.cases.studies.sampling.samples import salib_problem, sample_name
-from catenary.cases.studies.sampling.tables import SALTELLI, ChoicesTable, SamplingTable, SeedTable
 from catenary.cases.studies.uncertainty.run_table import RunTable
+from catenary.cases.studies.uncertainty.samples import salib_problem, sample_name
+from catenary.cases.studies.uncertainty.sampling import (
+    SALTELLI,
+    ChoicesTable,
+    SamplingTable,
+    SeedTable,
+)
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.run_schema import DONE
 

@@ -12,9 +12,9 @@ import pandas as pd
 from catenary.base.errors import InputError
 from catenary.base.files import is_file, is_folder
 from catenary.cases.scene.input.plain_text import plain
-from catenary.cases.studies.sampling.tables import ChoicesTable, SamplingTable, sampling_of
 from catenary.cases.studies.sweep.jobs import OF_LINE
 from catenary.cases.studies.sweep.output import PARQUET, TABLE
+from catenary.cases.studies.uncertainty.sampling import ChoicesTable, SamplingTable, sampling_of
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.report.study_table import Content
 

@@ -26,7 +26,9 @@ from scipy.optimize import OptimizeResult, least_squares
 from catenary.base.errors import CatenaryError, InputError
 from catenary.cases.run.prepared import sound_rest
 from catenary.cases.scene.scene import Scene, problem_of
-from catenary.cases.studies.identification.measurement import (
+from catenary.cases.studies.measured import read_table
+from catenary.cases.studies.parameters.derivatives import change_by, parts_of
+from catenary.cases.studies.parameters.measurement import (
     FORCE,
     HEIGHT,
     UNITS,
@@ -34,7 +36,8 @@ from catenary.cases.studies.identification.measurement import (
     Signal,
     Task,
 )
-from catenary.cases.studies.identification.posterior import (
+from catenary.cases.studies.parameters.parameters import ChangedScenes, Parameter
+from catenary.cases.studies.parameters.posterior import (
     Judged,
     Posterior,
     innovations_of,
@@ -42,9 +45,6 @@ from catenary.cases.studies.identification.posterior import (
     judge,
     posterior_of,
 )
-from catenary.cases.studies.measured import read_table
-from catenary.cases.studies.sensitivity.derivatives import change_by, parts_of
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.postproc.evaluate.filters import check_sampling
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.statics.line_at_rest import LineAtRest
