@@ -213,7 +213,8 @@ class Problem:
         for summary, own in zip(summaries, found, strict=True):
             if None in own:
                 n_objective, n_margins = self._sizes
-                broke = str(summary.get(BROKE, "the run has no such statistic"))
+                lacks = f"the run has no {statistics[own.index(None)]}"
+                broke = str(summary.get(BROKE, lacks))
                 objective = np.full(n_objective, _OF_BROKEN)
                 return Point(change, objective, np.full(n_margins, -1.0), np.inf, broke)
         values, *bounded = zip(*found, strict=True)

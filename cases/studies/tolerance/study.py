@@ -231,7 +231,7 @@ def find_tolerances(
     Raises
     ------
     InputError
-        If a run of the line without errors broke, or nothing is judged.
+        If a run of the line without errors broke, nothing is judged, or a criterion has no figure.
     """
     search = _Search(plan, Evaluation(pool, kept), say)
     found: list[Tolerance] = []
@@ -286,6 +286,12 @@ class _Search:
                 "the case breaks without errors, so that it has no criteria: try it with "
                 "`catenary run`"
             )
+        for number, one in enumerate(task.criteria):
+            if any(values_of(summary, one.statistic) is None for summary in summaries):
+                raise InputError(
+                    f"criteria.{number}.statistic is {one.statistic}, of which a run of the case "
+                    "without errors has no figure; leave it out, or evaluate a stretch that has one"
+                )
         self.nominal = [margins_of(summary, task.criteria) for summary in summaries]
         self.bounds = bounds_of(summaries, task.criteria)
         if not self.bounds:
