@@ -212,7 +212,7 @@ def test_entries_lists_and_forces_by_speed_are_parameters() -> None:
     force = line.parameter("pantographs.three_masses.static_force_N")
     changed_force = problem_of(line.changed(force, 2.0)).train.placements[0].static_force
     assert changed_force == pytest.approx(force.values[0] + 2.0)
-    assert (sag.unit, sag.change, sag.text) == ("mm", 1.0, "9 values")
+    assert (sag.unit, sag.change, sag.cells["shown"]) == ("mm", 1.0, "9 values")
 
 
 @pytest.mark.parametrize(

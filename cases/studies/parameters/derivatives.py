@@ -278,14 +278,8 @@ def _rows(found: Sensitivity) -> list[list[dict[str, Any]]]:
     every = []
     for number, parameter in enumerate(found.parameters):
         change, uplift = parameter.change, float(found.by_uplift[number])
-        head = {
-            "parameter": parameter.key,
-            "shown": parameter.text,
-            "value": parameter.values[0] if len(parameter.values) == 1 else [*parameter.values],
-            "unit": parameter.unit,
-            "change": change,
-            "max_uplift_change_mm": None if np.isnan(uplift) else change * uplift * _MM,
-        }
+        moved = None if np.isnan(uplift) else change * uplift * _MM
+        head = {**parameter.cells, "max_uplift_change_mm": moved}
         rows = []
         for name, by_force in zip(found.names, found.by_force, strict=True):
             by = {of: float(own[number]) for of, own in by_force._asdict().items()}
@@ -479,9 +473,7 @@ def along_span(found: RestSensitivity) -> StudyTable:
     )]  # fmt: skip
     rows = [
         {
-            "parameter": parameter.key,
-            "unit": parameter.unit,
-            "change": parameter.change,
+            **parameter.cells,
             "wire": wire,
             "x_m": float(found.x[i]),
             "height_m": float(found.height[i, j]),
@@ -516,10 +508,7 @@ def _rest_table(found: RestSensitivity) -> StudyTable:
         height = _MM * change * float(moved[place, wire])
         rows.append(
             {
-                "parameter": parameter.key,
-                "shown": parameter.text,
-                "unit": parameter.unit,
-                "change": change,
+                **parameter.cells,
                 "height": height,
                 "at": float(found.x[place]) if abs(height) >= _SEEN_HEIGHT_MM else None,
                 "mean": 100.0

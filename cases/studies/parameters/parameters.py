@@ -156,9 +156,16 @@ class Parameter:
         return _CHANGES.get(self.unit, 0.01 * self.size or 1.0)
 
     @property
-    def text(self) -> str:
-        """Its value where people read it."""
-        return f"{self.values[0]:g}" if len(self.values) == 1 else f"{len(self.values)} values"
+    def cells(self) -> dict[str, Any]:
+        """What tables of changes say of it, its value as people read it under "shown"."""
+        one = len(self.values) == 1
+        return {
+            "parameter": self.key,
+            "shown": f"{self.values[0]:g}" if one else f"{len(self.values)} values",
+            "value": self.values[0] if one else [*self.values],
+            "unit": self.unit,
+            "change": self.change,
+        }
 
 
 class ChangedScenes:
