@@ -316,7 +316,7 @@ class AtRest:
         """
         import xarray as xr
 
-        from catenary.cases.studies.sensitivity.derivatives import rest_sensitivity_of
+        from catenary.cases.studies.parameters.derivatives import rest_sensitivity_of
 
         names = listed(parameters, "parameters")
         found = rest_sensitivity_of(self._scene, names, droppers=droppers)

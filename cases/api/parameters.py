@@ -15,8 +15,8 @@ from catenary.scenes import Scene, SceneLike, checked, scene_of, tables_or_file
 if TYPE_CHECKING:
     import pandas as pd
 
-    from catenary.cases.studies.identification.measurement import Task
-    from catenary.cases.studies.identification.study import Identification
+    from catenary.cases.studies.parameters.identification import Identification
+    from catenary.cases.studies.parameters.measurement import Task
     from catenary.postproc.report.study_table import Content, StudyTable
 
 SENSITIVITIES, AT_REST = "sensitivity.csv", "sensitivity_at_rest.csv"
@@ -86,7 +86,7 @@ def derivatives(
 ) -> Derivatives:
     """Differentiate a march, for ``sensitivity`` and its verb, with its errors. Not collective."""
     own, comm = checked(scene), alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.sensitivity.derivatives import as_text, sensitivity_of, table_of
+    from catenary.cases.studies.parameters.derivatives import as_text, sensitivity_of, table_of
 
     with progress_shown(progress, comm):
         found = sensitivity_of(own, list(parameters), comm, droppers=droppers, shows=progress)
@@ -97,7 +97,7 @@ def rest_derivatives(
     scene: SceneLike, parameters: Sequence[str] = (), *, droppers: bool = False
 ) -> Derivatives:
     """Differentiate a line at rest, for the verb; as ``AtRest.sensitivity``. Not collective."""
-    from catenary.cases.studies.sensitivity.derivatives import (
+    from catenary.cases.studies.parameters.derivatives import (
         along_span,
         rest_sensitivity_of,
         rest_text,
@@ -177,7 +177,7 @@ class Identified:
         return f"<catenary.Identified: {counted(len(self.parameters), 'parameter')}>"
 
     def __str__(self) -> str:
-        from catenary.cases.studies.identification.output import as_text
+        from catenary.cases.studies.parameters.identified import as_text
 
         return as_text(self._own)
 
@@ -264,8 +264,8 @@ def identified(
     import pandas as pd
 
     comm = alone()  # starts MPI as one process, before anything imports it
-    from catenary.cases.studies.identification import output
-    from catenary.cases.studies.identification.study import identify as find
+    from catenary.cases.studies.parameters import identified as output
+    from catenary.cases.studies.parameters.identification import identify as find
 
     samples = measured
     if not isinstance(samples, pd.DataFrame):
@@ -295,7 +295,7 @@ def task_of(task: str | Path | Mapping[str, Any]) -> Task:
 
     Raises InputError if it is wrong.
     """
-    from catenary.cases.studies.identification.measurement import Task
+    from catenary.cases.studies.parameters.measurement import Task
     from catenary.cases.studies.task_files import read_task
 
     return read_task(tables_or_file(task, "task"), Task)
@@ -303,6 +303,6 @@ def task_of(task: str | Path | Mapping[str, Any]) -> Task:
 
 def identified_files(found: Identified) -> dict[str, Content]:
     """What ``catenary identify -o`` writes. Not collective."""
-    from catenary.cases.studies.identification.output import files_of
+    from catenary.cases.studies.parameters.identified import files_of
 
     return files_of(found._own)

@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from catenary.cases.scene.load import Draft
-    from catenary.cases.studies.sampling.tables import SamplingTable
     from catenary.cases.studies.uncertainty import evaluation
     from catenary.cases.studies.uncertainty.run_table import RunTable
+    from catenary.cases.studies.uncertainty.sampling import SamplingTable
     from catenary.postproc.report.study_table import Content
 
 
@@ -184,7 +184,7 @@ def estimate_files(found: Uncertainty) -> dict[str, Content]:
 
 def sampling_like(sample: Mapping[str, Any] | str | Path) -> tuple[SamplingTable, str]:
     """The checked tables of a sampling, and where they were written, for sentences."""
-    from catenary.cases.studies.sampling.tables import read_sampling, sampling_of
+    from catenary.cases.studies.uncertainty.sampling import read_sampling, sampling_of
 
     given, where = tables_or_file(sample, "sample"), "the table given as sample"
     if isinstance(given, Path):
@@ -300,7 +300,7 @@ def samples_of(
 
     Not collective.
     """
-    from catenary.cases.studies.sampling.samples import samples
+    from catenary.cases.studies.uncertainty.samples import samples
 
     sampling, where = sampling_like(sample)
     return samples(sampling, draft.scene(), where), sampling

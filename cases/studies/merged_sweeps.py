@@ -12,7 +12,6 @@ from pydantic import BaseModel
 from catenary.base.errors import InputError
 from catenary.base.files import is_there
 from catenary.cases.scene.input.faults import shown
-from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.histories import FILE as HISTORIES
 from catenary.cases.studies.sweep.histories import merge_histories
 from catenary.cases.studies.sweep.output import table_files
@@ -20,6 +19,7 @@ from catenary.cases.studies.sweep.sweep import RECORD, other_value
 from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import Uncertainty
 from catenary.cases.studies.uncertainty.run_table import read_sampling_beside
+from catenary.cases.studies.uncertainty.sampling import SamplingTable
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.report.study_table import Column, StudyTable, write_files
 

@@ -18,9 +18,9 @@ from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.report.study_table import write_files
 
 if TYPE_CHECKING:
-    from catenary.cases.studies.sampling.tables import SamplingTable
     from catenary.cases.studies.sweep.together import Ensemble
     from catenary.cases.studies.uncertainty.evaluation import Uncertainty
+    from catenary.cases.studies.uncertainty.sampling import SamplingTable
 
 
 class Swept(NamedTuple):

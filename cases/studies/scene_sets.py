@@ -63,10 +63,6 @@ class BoundTable(Table):
             return f"{self.statistic} >= {self.at_least:g}"
         return f"{self.statistic} <= {self.at_most:g}"
 
-    def margin(self, value: float) -> float:
-        """Distance of a value from the bound, in its unit; negative beyond."""
-        return self.limit - value if self.at_least is None else value - self.limit
-
     @property
     def limit(self) -> float:
         """The least or the greatest value allowed."""

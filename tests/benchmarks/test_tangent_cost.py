@@ -10,8 +10,8 @@ from mpi4py import MPI
 from scenes import load_scene
 
 from catenary.cases.run.at_rest import sound_rest
-from catenary.cases.studies.sensitivity.derivatives import change_by
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes
+from catenary.cases.studies.parameters.derivatives import change_by
+from catenary.cases.studies.parameters.parameters import ChangedScenes
 from catenary.solver.statics.line_at_rest import LineAtRest
 from catenary.solver.tangents.march import march_with_tangents
 from catenary.solver.tangents.set_up import Change, set_up_of

@@ -20,22 +20,22 @@ from twin_passages import filtered_noise, write_measurement
 
 import catenary
 from catenary import InputError
-from catenary.cases.studies.identification.measurement import (
+from catenary.cases.studies.measured import Measured, column_of, read_table
+from catenary.cases.studies.parameters.identification import Identification, Unknown
+from catenary.cases.studies.parameters.identified import draw_parameters, draw_passage, verdict
+from catenary.cases.studies.parameters.measurement import (
     Measurement,
     Signal,
     Task,
     Whitening,
     correlation,
 )
-from catenary.cases.studies.identification.output import draw_parameters, draw_passage, verdict
-from catenary.cases.studies.identification.posterior import (
+from catenary.cases.studies.parameters.posterior import (
     innovations_of,
     is_doubtful,
     judge,
     posterior_of,
 )
-from catenary.cases.studies.identification.study import Identification, Unknown
-from catenary.cases.studies.measured import Measured, column_of, read_table
 from catenary.cases.studies.task_files import checked_table
 from catenary.postproc.evaluate import filters
 

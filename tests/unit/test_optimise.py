@@ -309,6 +309,14 @@ def test_symmetric_entries_change_alike_and_places_against_each_other() -> None:
     assert moved == [5.0, 10.25, 16.0, 21.5, 27.5, 33.5, 39.0, 44.75, 50.0]
 
 
+def test_a_constraint_without_a_figure_is_named(evaluated: Any) -> None:
+    evaluated(lambda scene: {**summary(20.0), "supports": {}})
+    uplift = {"statistic": "max_uplift_mm", "at_most": 50.0}
+    plan = study.make_plan(draft(), task_of(set=FORWARD, constraints=[uplift]))
+    with pytest.raises(InputError, match="no figures to begin with: the run has no max_uplift_mm"):
+        study.optimise(plan)
+
+
 def test_bounds_of_values_are_bounds_of_changes() -> None:
     own = variables(key="line.dropper.pre_sag_mm", entries=[[2, 3]], bounds=[0.0, 50.0])
     # 10 and 20 mm: down by 10 until the one is 0, up by 30 until the other is 50.

@@ -291,7 +291,7 @@ def test_nothing_is_printed_unless_a_program_asks() -> None:
 def test_derivatives_at_rest_say_what_they_are_and_what_is_left_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from catenary.cases.studies.sensitivity import derivatives
+    from catenary.cases.studies.parameters import derivatives
 
     own, tension = derivatives._rest_derivative, "line.contact_wire.tension_N"
 
@@ -315,7 +315,7 @@ def test_derivatives_at_rest_say_what_they_are_and_what_is_left_out(
 
 
 def test_derivatives_of_a_march_say_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    from catenary.cases.studies.sensitivity import derivatives
+    from catenary.cases.studies.parameters import derivatives
 
     own, tension = derivatives.change_by, "line.contact_wire.tension_N"
 

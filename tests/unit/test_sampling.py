@@ -17,10 +17,10 @@ from scipy import stats
 
 from catenary import InputError
 from catenary.cases.scene.input.case_files import parse_assignment
-from catenary.cases.studies.sampling.samples import sample_name, samples
-from catenary.cases.studies.sampling.tables import SamplingTable, read_sampling, sampling_of
 from catenary.cases.studies.sweep.jobs import scene_of
 from catenary.cases.studies.sweep.variants import Variant
+from catenary.cases.studies.uncertainty.samples import sample_name, samples
+from catenary.cases.studies.uncertainty.sampling import SamplingTable, read_sampling, sampling_of
 
 CASE = "en50318_2002"
 FILE = "uncertain.toml"

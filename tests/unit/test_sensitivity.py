@@ -22,14 +22,14 @@ from catenary import InputError
 from catenary.cases.run.at_rest import rest_of, sound_rest
 from catenary.cases.scene.load import recorded_scene
 from catenary.cases.scene.scene import resolved
-from catenary.cases.studies.sensitivity.derivatives import (
+from catenary.cases.studies.parameters.derivatives import (
     Sensitivity,
     as_text,
     change_by,
     sensitivity_of,
     table_of,
 )
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
+from catenary.cases.studies.parameters.parameters import ChangedScenes, Parameter
 from catenary.postproc.evaluate.statistics import contact_statistics
 from catenary.solver.statics.line_at_rest import line_at_rest
 from catenary.solver.tangents.march import march_with_tangents
@@ -67,7 +67,8 @@ def test_statistics_change_as_runs_with_other_values() -> None:
     """Runs at both sides of a parameter, near enough for contacts and droppers to keep their
     steps."""
     found, other = tiny(), scenes(*TINY)
-    for key, own, by_uplift in zip(KEYS, found.by_force, found.by_uplift, strict=True):
+    (by_force,) = found.by_force
+    for number, (key, by_uplift) in enumerate(zip(KEYS, found.by_uplift, strict=True)):
         parameter = other.parameter(key)
         step, both = 1e-6 * parameter.size, []
         for by in (step, -step):
@@ -80,10 +81,9 @@ def test_statistics_change_as_runs_with_other_values() -> None:
         for name in ("mean", "std", "maximum", "minimum", "stat_max", "stat_min"):
             high, low = (getattr(statistics, name) for statistics, _ in both)
             # Round-off of 100 N, 1e-12 N after a march, over the step, and the step itself.
-            limit = 1e-12 * 100.0 / step + 1e-5 * abs(getattr(own[0], name))
-            check(
-                f"{name} by {key}", getattr(own[0], name), (high - low) / (2 * step), within=limit
-            )
+            by = getattr(by_force, name)[number]
+            limit = 1e-12 * 100.0 / step + 1e-5 * abs(by)
+            check(f"{name} by {key}", by, (high - low) / (2 * step), within=limit)
         high, low = (seen.uplift.max() for _, seen in both)
         limit = 1e-12 / step + 1e-5 * abs(by_uplift)
         check(f"uplift by {key}", by_uplift, (high - low) / (2 * step), within=limit)
@@ -108,12 +108,12 @@ def test_the_table_is_ranked_and_in_the_units_of_keys() -> None:
     assert ranks == sorted(ranks, reverse=True) and len(ranks) == 2
     force = next(row for row in table.rows if row["parameter"] == KEYS[0])
     assert (force["unit"], force["value"], force["change"]) == ("N", 120.0, 1.0)
-    assert force["mean_change_N"] == found.by_force[0][0].mean
-    assert force["std_change_by_percent_N"] == pytest.approx(1.2 * found.by_force[0][0].std)
+    assert force["mean_change_N"] == found.by_force[0].mean[0]
+    assert force["std_change_by_percent_N"] == pytest.approx(1.2 * found.by_force[0].std[0])
     assert force["max_uplift_change_mm"] == pytest.approx(1e3 * found.by_uplift[0])
     tension = next(row for row in table.rows if row["parameter"] == KEYS[1])
     assert tension["change"] == 1000.0
-    assert tension["std_change_N"] == pytest.approx(1000.0 * found.by_force[1][0].std)
+    assert tension["std_change_N"] == pytest.approx(1000.0 * found.by_force[0].std[1])
     # A newton of static force is a newton of mean force, but for the base's spring of 50 N/m.
     assert force["mean_change_N"] == pytest.approx(1.0, abs=0.03)
 
@@ -172,8 +172,8 @@ def test_the_place_of_one_pantograph_moves_that_one_only() -> None:
     assert np.allclose(seen.by_position[:, 0], [0.0, -1.0], rtol=0.0, atol=1e-9)
     found = sensitivity_of(load_scene(CASE, two), [key], MPI.COMM_SELF)
     assert found.names == ["leading", "trailing"]
-    leading, trailing = found.by_force[0]
-    assert 0.0 < abs(leading.std) and abs(trailing.std) > 0.0
+    leading, trailing = found.by_force
+    assert 0.0 < abs(leading.std[0]) and abs(trailing.std[0]) > 0.0
 
 
 def test_what_is_printed_tells_how_often_contacts_and_droppers_switch() -> None:
@@ -212,7 +212,7 @@ def test_entries_lists_and_forces_by_speed_are_parameters() -> None:
     force = line.parameter("pantographs.three_masses.static_force_N")
     changed_force = problem_of(line.changed(force, 2.0)).train.placements[0].static_force
     assert changed_force == pytest.approx(force.values[0] + 2.0)
-    assert (sag.unit, sag.change, sag.text) == ("mm", 1.0, "9 values")
+    assert (sag.unit, sag.change, sag.cells["shown"]) == ("mm", 1.0, "9 values")
 
 
 @pytest.mark.parametrize(
@@ -288,7 +288,7 @@ def test_a_longer_dropper_changes_the_rest_as_elasticity_says() -> None:
     nodes = line_at_rest(problem_of(line.scene), mesh_of(line.scene)).model.contact_x
     assert nodes[lowest] == pytest.approx(150.0) and -1.0 < sinks[lowest] < -0.1
     found = sensitivity_of(load_scene(CASE, TINY), [parameter.key], MPI.COMM_SELF)
-    assert found.by_force[0][0].std != 0.0
+    assert found.by_force[0].std[0] != 0.0
     (row,) = table_of(found).rows
     assert row["std_change_by_percent_N"] is None
 
@@ -390,7 +390,7 @@ def test_the_verb_writes_its_table_once(tmp_path: Path) -> None:
     assert first.exit_code == 0, first.output
     (row,) = csv.DictReader((tmp_path / "sensitivity.csv").read_text().splitlines())
     assert row["parameter"] == KEYS[0]
-    expected = tiny().by_force[0][0].std
+    expected = tiny().by_force[0].std[0]
     assert float(row["std_change_N"]) == pytest.approx(expected, rel=1e-12)
     again = invoke(*words)
     assert again.exit_code == 2 and "is there already" in again.output

@@ -328,15 +328,23 @@ def test_a_line_that_breaks_keeps_no_criterion(evaluated: Any, monkeypatch: Any)
     assert found.level == pytest.approx(20.0 / np.sort(drawn)[-3], abs=0.4)
 
 
+def test_a_criterion_without_a_figure_is_refused(evaluated: Any) -> None:
+    """As of uplifts where no arm is evaluated; these summaries have no least force."""
+    evaluated(lambda scene: 20.0)
+    lacking = {"statistic": "min_N", "at_least": 1.0}
+    plan = make_plan(tiny(), task_of(SPEED, criteria=[AT_MOST, lacking]))
+    with pytest.raises(InputError, match=r"criteria\.1\.statistic is min_N, of which a run"):
+        find_tolerances(plan)
+
+
 def test_margins_have_the_sign_of_their_bounds() -> None:
     run = {**summary(20.0), "pantographs": [{"name": "one", "std_N": 20.0, "min_N": 12.0}]}
     bounds = [BoundTable(statistic="min_N", at_least=15.0), BoundTable(**AT_MOST)]
     margins = margins_of(run, bounds)
     assert margins == {"min_N >= 15": [-3.0], "std_N <= 30": [10.0]}
     assert least([margins, {"": [-np.inf]}], "std_N <= 30") == -np.inf
-    run["acceptance"].append(
-        {"criterion": "least", "value": 5.0, "limit": 0.0, "relation": ">", "passed": True}
-    )
+    own = {"criterion": "least", "value": 5.0, "unit": "N"}
+    run["acceptance"].append({**own, "limit": 0.0, "relation": ">", "passed": True})
     assert margins_of(run, []) == {"deviation": [10.0], "least": [5.0]}
 
 

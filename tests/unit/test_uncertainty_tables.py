@@ -13,7 +13,6 @@ import pytest
 
 from catenary import InputError
 from catenary.cases.studies import merged_sweeps
-from catenary.cases.studies.sampling.tables import sampling_of
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.output import files_of, table_of
 from catenary.cases.studies.sweep.variants import Variant
@@ -24,6 +23,7 @@ from catenary.cases.studies.uncertainty.run_table import (
     read_run_table,
     run_table,
 )
+from catenary.cases.studies.uncertainty.sampling import sampling_of
 from catenary.postproc.report.study_table import write_files
 
 pytestmark = pytest.mark.usefixtures("quick_reports")

@@ -18,12 +18,17 @@ from scenes import Scene, load_scene, problem_of
 from scipy import stats
 from twin_passages import filtered_noise, write_measurement
 
-from catenary.cases.studies.identification.measurement import Measurement, Task
-from catenary.cases.studies.identification.output import as_text, verdict
-from catenary.cases.studies.identification.posterior import innovations_of, judge, posterior_of
-from catenary.cases.studies.identification.study import FittedMarch, Identification, identify
 from catenary.cases.studies.measured import read_table
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes
+from catenary.cases.studies.parameters.identification import (
+    FittedMarch,
+    Identification,
+    Unknown,
+    identify,
+)
+from catenary.cases.studies.parameters.identified import as_text, verdict
+from catenary.cases.studies.parameters.measurement import Measurement, Task
+from catenary.cases.studies.parameters.parameters import ChangedScenes
+from catenary.cases.studies.parameters.posterior import innovations_of, judge, posterior_of
 from catenary.cases.studies.task_files import read_task
 
 FORCE_NOISE, HEIGHT_NOISE = 5.0, 5e-3
@@ -190,7 +195,9 @@ def test_widths_are_right_in_repeated_linear_trials(tmp_path: Path) -> None:
     measurement = Measurement(
         read_table(file), "m", columns, problem.train.speed, 65.0, problem.evaluation
     )
-    march = FittedMarch(scenes, parameters, measurement, MPI.COMM_SELF)
+    priors = zip(parameters, prior, strict=True)
+    sought = [Unknown(one.key, one.unit, one.values[0], own, one) for one, own in priors]
+    march = FittedMarch(scenes, sought, measurement, MPI.COMM_SELF)
     by = march.derivatives([0.0] * len(parameters))
     step = int(round(np.diff(measurement.place)[0] / (problem.train.speed * problem.numerics.dt)))
     n = measurement.place.size

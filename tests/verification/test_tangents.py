@@ -24,8 +24,8 @@ from studies import few
 
 from catenary import InputError
 from catenary.cases.run.at_rest import sound_rest
-from catenary.cases.studies.sensitivity.derivatives import change_by
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes
+from catenary.cases.studies.parameters.derivatives import change_by
+from catenary.cases.studies.parameters.parameters import ChangedScenes
 from catenary.mbs.lumped import LumpedData
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import LinearLaw

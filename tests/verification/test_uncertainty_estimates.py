@@ -12,8 +12,6 @@ from measuring import check
 from scenes import load_scene
 from scipy import stats
 
-from catenary.cases.studies.sampling.samples import samples
-from catenary.cases.studies.sampling.tables import SamplingTable, sampling_of
 from catenary.cases.studies.uncertainty.evaluation import (
     deviation,
     evaluate,
@@ -23,6 +21,8 @@ from catenary.cases.studies.uncertainty.evaluation import (
     share,
 )
 from catenary.cases.studies.uncertainty.run_table import RunTable, run_table
+from catenary.cases.studies.uncertainty.samples import samples
+from catenary.cases.studies.uncertainty.sampling import SamplingTable, sampling_of
 
 REPETITIONS = 1000
 # Three keys of a scene that take the inputs of Ishigami's function, and one without influence.

@@ -154,7 +154,7 @@ def identify(
 
     wanted = task_of(task)
     scene = words.scene()
-    from catenary.cases.studies.identification.output import PARAMETERS
+    from catenary.cases.studies.parameters.identified import PARAMETERS
 
     refuse_table(out / PARAMETERS, force)
     found = identified(scene, measured, wanted, console.say)

@@ -8,12 +8,13 @@ which an installer needs.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from catenary.base.errors import InputError
 from catenary.cases.run.at_rest import static_table
@@ -109,6 +110,7 @@ class Problem:
     most_runs : of the search, after which ``Spent`` is raised; None for any number
     say : called with a line for each point that is better than all before
     history : all points, in the order in which they were asked for
+    best : of them: allowed before not allowed, then by the objective
     """
 
     scenes: SceneSet
@@ -120,6 +122,7 @@ class Problem:
     most_runs: int | None
     say: Callable[[str], None] = lambda line: None
     history: list[Point] = field(default_factory=list)
+    best: Point = field(init=False)
 
     def __post_init__(self) -> None:
         self._first_run = self.evaluation.n_runs
@@ -140,10 +143,6 @@ class Problem:
     def is_worst(self) -> bool:
         """Whether the objective is the greatest value of all scenes, else their mean."""
         return self.objective.over == "worst"
-
-    def best(self) -> Point:
-        """The best point so far: allowed before not allowed, then by the objective."""
-        return self._best
 
     def points(self, changes: Sequence[np.ndarray]) -> list[Point]:
         """Evaluate and record changes, (n,) each, with the runs of all of them made together.
@@ -167,10 +166,12 @@ class Problem:
         ]
         for point in found:
             if not self.history:
-                self._best = point
-            elif point.better_than(self._best):
-                self._best = point
-                self._tell(point)
+                self.best = point
+            elif point.better_than(self.best):
+                self.best = point
+                state = "" if not point.violation else ", constraints not kept"
+                runs = self.evaluation.n_runs - self._first_run
+                self.say(f"    {runs} runs: {self.objective.statistic} {point.value:.4g}{state}")
             self.history.append(point)
         return found
 
@@ -205,62 +206,52 @@ class Problem:
         return objective, margins
 
     def _point(self, change: np.ndarray, summaries: Sequence[dict[str, Any]]) -> Point:
-        found = [self._figures(summary) for summary in summaries]
-        broke = next((one for one in found if isinstance(one, str)), "")
-        if broke:
-            n_objective, n_margins = self._sizes
-            objective = np.full(n_objective, _OF_BROKEN)
-            return Point(change, objective, np.full(n_margins, -1.0), np.inf, broke)
-        whole = [one for one in found if not isinstance(one, str)]
-        counted = [own for (own, _), one in zip(whole, self._counts, strict=True) if one]
-        objective = np.concatenate(counted)
-        bounded = [[values[i] for _, values in whole] for i in range(len(self.constraints))]
+        statistics = [self.objective.statistic, *(one.statistic for one in self.constraints)]
+        found: list[list[Any]] = [
+            [values_of(one, name) for name in statistics] for one in summaries
+        ]
+        for summary, own in zip(summaries, found, strict=True):
+            if None in own:
+                n_objective, n_margins = self._sizes
+                lacks = f"the run has no {statistics[own.index(None)]}"
+                broke = str(summary.get(BROKE, lacks))
+                objective = np.full(n_objective, _OF_BROKEN)
+                return Point(change, objective, np.full(n_margins, -1.0), np.inf, broke)
+        values, *bounded = zip(*found, strict=True)
+        speeds, members = self.objective.speeds_km_h, self.scenes.members
+        counts = [speeds is None or member.speed in speeds for member in members]
+        objective = np.concatenate([own for own, one in zip(values, counts, strict=True) if one])
         if not self._bounds:  # this is the case as shipped
             self._bounds = [
-                self._bound(one, values)
-                for one, values in zip(self.constraints, bounded, strict=True)
+                self._bound(one, own) for one, own in zip(self.constraints, bounded, strict=True)
             ]
-        margins = np.concatenate(
-            [
-                *(
-                    sign_scale * (np.concatenate(values) - bound)
-                    for values, (bound, sign_scale) in zip(bounded, self._bounds, strict=True)
-                ),
-                self._at_rest(change),
-            ]
-        )
-        self._sizes = objective.size, margins.size
+        margins = [
+            sign_scale * (np.concatenate(own) - bound)
+            for own, (bound, sign_scale) in zip(bounded, self._bounds, strict=True)
+        ]
+        every = np.concatenate([*margins, self._at_rest(change)])
+        self._sizes = objective.size, every.size
         value = float(objective.max() if self.is_worst else objective.mean())
-        return Point(change, objective / self._scale, margins, value)
+        return Point(change, objective / self._scale, every, value)
 
     def _bound(
-        self, one: ConstraintTable, shipped: Sequence[np.ndarray]
+        self, one: ConstraintTable, shipped: Sequence[Sequence[float]]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds of the values of a constraint, as shipped one array a scene, and what makes a
+        """Bounds of the values of a constraint, as shipped a list for each scene, and what makes a
         margin of the distance from them: its sign over its scale."""
-        sign = 1.0 if one.at_least is not None else -1.0
-        bound = one.at_least if one.at_least is not None else one.at_most
-        assert bound is not None
+        sign, bound = 1.0 if one.at_least is not None else -1.0, one.limit
         values = np.concatenate(shipped)
         if one.of_shipped is None:
             return np.full(values.size, bound), np.full(values.size, sign / one.scale)
         if one.of_shipped == "speed":
-            members = zip(self.scenes.members, shipped, strict=True)
-            speeds = np.concatenate(
-                [np.full(own.size, member.speed or 0.0) for member, own in members]
-            )
+            of_members = [member.speed or 0.0 for member in self.scenes.members]
+            speeds = np.repeat(of_members, [len(own) for own in shipped])
             for speed in np.unique(speeds):
                 own = speeds == speed
                 values[own] = -sign * np.max(-sign * values[own])
         # A share of what is negative goes as far to the same side: -3 may fall by as much as 3 may.
         bounds = np.where(values < 0.0, 2.0 - bound, bound) * values
         return bounds, sign / np.where(values == 0.0, 1.0, np.abs(values))
-
-    @property
-    def _counts(self) -> list[bool]:
-        """Whether each scene counts in the objective."""
-        speeds = self.objective.speeds_km_h
-        return [speeds is None or member.speed in speeds for member in self.scenes.members]
 
     def beyond(self, point: Point) -> list[str]:
         """Sentences on the constraints that a point does not keep, and by how much at most."""
@@ -311,19 +302,6 @@ class Problem:
         scene = self.scenes.scene(self.scenes.members[0], self.variables.values(change))
         return (least_forces(scene) - self.least_dropper_force) / _FORCE_AT_REST
 
-    def _tell(self, point: Point) -> None:
-        state = "" if not point.violation else ", constraints not kept"
-        runs = self.evaluation.n_runs - self._first_run
-        self.say(f"    {runs} runs: {self.objective.statistic} {point.value:.4g}{state}")
-
-    def _figures(self, summary: dict[str, Any]) -> tuple[np.ndarray, list[np.ndarray]] | str:
-        """Objective and values of each constraint of a run, or why it has none."""
-        objective = values_of(summary, self.objective.statistic)
-        bounded = [values_of(summary, one.statistic) for one in self.constraints]
-        if objective is None or None in bounded:
-            return str(summary.get(BROKE, "the run has no such statistic"))
-        return np.array(objective), [np.array(values) for values in bounded]
-
 
 def _moved(change: np.ndarray, i: int, by: float) -> np.ndarray:
     found = change.copy()
@@ -339,7 +317,7 @@ def search(problem: Problem, method: str, table: SearchTable) -> Point:
         methods[method](problem, table)
     except Spent:
         pass
-    return problem.best()
+    return problem.best
 
 
 def _by_gradient(problem: Problem, table: SearchTable) -> None:
@@ -377,6 +355,16 @@ def _by_gradient(problem: Problem, table: SearchTable) -> None:
         found = slopes(z)[0]
         return np.column_stack([-found, np.ones(found.shape[0])])
 
+    gains: list[float] = []
+
+    def stalled(z: np.ndarray) -> None:
+        """End a search whose last iterations together gained less than the precision: slopes over
+        kinks mislead SLSQP near the optimum into many short steps."""
+        gains.append(np.inf if problem.best.violation else problem.best.value)
+        before = gains[-1 - _FRUITLESS] if len(gains) > _FRUITLESS else np.inf
+        if before - gains[-1] < table.precision * abs(before):
+            raise Spent
+
     start = -low / width
     constraints: list[dict[str, Any]] = []
     if point(start).margins.size:
@@ -395,30 +383,10 @@ def _by_gradient(problem: Problem, table: SearchTable) -> None:
         x0=start,
         bounds=bounds,
         constraints=constraints,
-        callback=_Stalled(problem, table.precision),
+        callback=stalled,
         method="SLSQP",
         options={"ftol": 0.1 * table.precision, "maxiter": _MOST_ITERATIONS},
     )
-
-
-class _Stalled:
-    """Ends a search, with ``Spent``, whose last iterations together gained less than a precision.
-
-    Slopes over kinks mislead SLSQP near the optimum into many short steps.
-    """
-
-    def __init__(self, problem: Problem, precision: float) -> None:
-        self._problem = problem
-        self._precision = precision
-        self._values: list[float] = []
-
-    def __call__(self, z: np.ndarray) -> None:
-        best = self._problem.best()
-        self._values.append(np.inf if best.violation else best.value)
-        if len(self._values) > _FRUITLESS:
-            before = self._values[-1 - _FRUITLESS]
-            if before - self._values[-1] < self._precision * abs(before):
-                raise Spent
 
 
 def _by_evolution(problem: Problem, table: SearchTable) -> None:
@@ -448,16 +416,13 @@ def _by_evolution(problem: Problem, table: SearchTable) -> None:
         found = problem.points([np.clip(one, low, high) for one in wanted])
         ranks = []
         for share, change, point in zip(asked, wanted, found, strict=True):
-            beyond = np.linalg.norm((change - point.change) / (high - low))
-            far = _BEHIND * np.linalg.norm(share) if point.broke else 0.0
-            ranks.append(_rank(point, scale) + beyond + far)
+            rank = float(np.linalg.norm((change - point.change) / (high - low)))
+            if point.broke:
+                rank += _BEHIND * (10.0 + float(np.linalg.norm(share)))
+            else:
+                rank += _BEHIND + point.violation if point.violation else point.value / scale
+            ranks.append(rank)
         strategy.tell(asked, ranks)
-
-
-def _rank(point: Point, scale: float) -> float:
-    if point.broke:
-        return 10.0 * _BEHIND
-    return _BEHIND + point.violation if point.violation else point.value / scale
 
 
 def dropper_table(shipped: Scene, optimum: Scene) -> StudyTable:
@@ -466,16 +431,19 @@ def dropper_table(shipped: Scene, optimum: Scene) -> StudyTable:
     Both scenes have as many droppers in each span. Not collective.
     """
     before, after = _droppers(shipped), _droppers(optimum)
-    moved = 1e3 * (after["in_span"] - before["in_span"])
-    cut = 1e3 * before["length"], 1e3 * after["length"], 1e3 * (after["length"] - before["length"])
-    rows: list[Mapping[str, Any]] = []
-    number: dict[int, int] = {}
-    for i, span in enumerate(after["span"].tolist()):
-        number[span] = number.get(span, 0) + 1
-        figures = (after["in_span"][i], moved[i], *(own[i] for own in cut))
-        cells = (span + 1, number[span], after["wires"][i], *map(float, figures))
-        rows.append(dict(zip((column.name for column in _COLUMNS), cells, strict=True)))
-    return StudyTable(_COLUMNS, rows, "Lengths of droppers")
+    rows = pd.DataFrame(
+        {
+            "span": after["span"] + 1,
+            "dropper": after.groupby("span").cumcount() + 1,
+            "wires": after["wires"],
+            "in_span_m": after["in_span"],
+            "moved_mm": 1e3 * (after["in_span"] - before["in_span"]),
+            "shipped_mm": 1e3 * before["length"],
+            "length_mm": 1e3 * after["length"],
+            "change_mm": 1e3 * (after["length"] - before["length"]),
+        }
+    )
+    return StudyTable(_COLUMNS, rows.to_dict("records"), "Lengths of droppers")
 
 
 def of_middle_span(table: StudyTable) -> StudyTable:
@@ -487,18 +455,20 @@ def of_middle_span(table: StudyTable) -> StudyTable:
     return StudyTable(table.columns, rows, f"Lengths of droppers in span {span}")
 
 
-def _droppers(scene: Scene) -> dict[str, Any]:
+def _droppers(scene: Scene) -> pd.DataFrame:
     """Spans, places in them, lengths and wires of all droppers along the track."""
     table = static_table(scene)
     order = np.argsort(table["dropper_x"], kind="stable")
     span = table["dropper_span"].astype(int)[order]
-    ends = (table[f"dropper_{end}"][order].astype(str) for end in ("upper", "lower"))
-    return {
-        "span": span,
-        "in_span": table["dropper_x"][order] - table["support_x"][span],
-        "length": table["dropper_length"][order],
-        "wires": [f"{upper} to {lower}" for upper, lower in zip(*ends, strict=True)],
-    }
+    upper, lower = (table[f"dropper_{end}"][order].astype(str) for end in ("upper", "lower"))
+    return pd.DataFrame(
+        {
+            "span": span,
+            "in_span": table["dropper_x"][order] - table["support_x"][span],
+            "length": table["dropper_length"][order],
+            "wires": [" to ".join(ends) for ends in zip(upper, lower, strict=True)],
+        }
+    )
 
 
 def least_forces(scene: Scene) -> np.ndarray:

@@ -327,6 +327,10 @@ class Bound(NamedTuple):
     is_least: bool
     meaning: str
 
+    def margin(self, value: float) -> float:
+        """Distance of a value from the limit, negative beyond."""
+        return value - self.limit if self.is_least else self.limit - value
+
     def values(self, margins: np.ndarray) -> np.ndarray:
         """Values with these margins to the limit."""
         return self.limit + (margins if self.is_least else -margins)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -35,7 +35,7 @@ from catenary.cases.studies.tolerance.errors import (
 )
 from catenary.postproc.evaluate.wording import counted
 
-# A row for each thing that is measured of a run, such as a pantograph: its criterion and margin.
+# By criteria the margins of what is measured of a run, such as its pantographs.
 Margins = dict[str, list[float]]
 
 
@@ -51,80 +51,46 @@ def margins_of(summary: Mapping[str, Any], criteria: Sequence[BoundTable]) -> Ma
     """
     if BROKE in summary:
         return {"": [-np.inf]}
-    if criteria:
-        return {one.text: _margins(summary, one) for one in criteria}
     found: Margins = {}
-    for row in _judged(summary):
-        by = row["limit"] - row["value"]
-        margin = -by if row["relation"].startswith(">") else by
-        found.setdefault(_without_pantograph(row["criterion"], summary), []).append(margin)
+    for name, bound, value in _judged(summary, criteria):
+        margin = -np.inf if value is None else bound.margin(value)
+        found.setdefault(name, []).append(margin)
     return found
-
-
-def _judged(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Criteria by which the rule books have judged a run."""
-    return [row for row in summary["acceptance"] if row["passed"] is not None]
-
-
-def _margins(summary: Mapping[str, Any], one: BoundTable) -> list[float]:
-    values = values_of(summary, one.statistic)
-    return [-np.inf] if values is None else [one.margin(value) for value in values]
-
-
-def _without_pantograph(criterion: str, summary: Mapping[str, Any]) -> str:
-    """A criterion without the name of one of several pantographs at its end."""
-    for one in summary["pantographs"]:
-        criterion = criterion.removesuffix(f", {one['name']}")
-    return criterion
 
 
 def bounds_of(
     summaries: Sequence[Mapping[str, Any]], criteria: Sequence[BoundTable]
 ) -> dict[str, Bound]:
-    """Bounds of all criteria by their names, as ``margins_of`` names them.
+    """Bounds of all criteria of runs that did not break, by their names, as of ``margins_of``.
 
     A criterion of the standard whose limit is another one in other runs has its margin bounded.
-
-    Parameters
-    ----------
-    summaries : of the runs of the line without errors, none of which broke
-    criteria : as of ``margins_of``
     """
-    found = {
-        one.text: Bound(
-            one.limit,
-            one.at_least is not None,
-            STATISTICS[one.statistic].meaning or one.statistic,
-        )
-        for one in criteria
-    }
-    for summary in summaries if not criteria else ():
-        for row in _judged(summary):
-            name = _without_pantograph(row["criterion"], summary)
-            own = Bound(row["limit"], row["relation"].startswith(">"), f"{name} [{row['unit']}]")
-            if found.setdefault(name, own) != own:
-                found[name] = Bound(0.0, True, f"margin of {own.meaning}")
+    found: dict[str, Bound] = {}
+    for summary in summaries:
+        for name, bound, _ in _judged(summary, criteria):
+            if found.setdefault(name, bound) != bound:
+                found[name] = Bound(0.0, True, f"margin of {bound.meaning}")
     return found
 
 
-def names_of(margins: Sequence[Margins]) -> list[str]:
-    """The criteria of several runs.
-
-    Raises
-    ------
-    InputError
-        If a run broke, or nothing is judged.
-    """
-    if any("" in one for one in margins):
-        raise InputError(
-            "the case breaks without errors, so that it has no criteria: try it with `catenary run`"
-        )
-    found = list(dict.fromkeys(name for one in margins for name in one))
-    if not found:
-        raise InputError(
-            "the rule books of the scene judge no run of the set: name criteria in the task"
-        )
-    return found
+def _judged(
+    summary: Mapping[str, Any], criteria: Sequence[BoundTable]
+) -> Iterator[tuple[str, Bound, float | None]]:
+    """Names and bounds of criteria, and each value that they are of, None if the run has none."""
+    for one in criteria:
+        meaning = STATISTICS[one.statistic].meaning or one.statistic
+        bound = Bound(one.limit, one.at_least is not None, meaning)
+        values: Sequence[float | None] = values_of(summary, one.statistic) or [None]
+        for value in values:
+            yield one.text, bound, value
+    for row in summary["acceptance"] if not criteria else ():
+        if row["passed"] is None:  # the rule books judge it not
+            continue
+        name = row["criterion"]
+        for one in summary["pantographs"]:  # of several a criterion ends in their name
+            name = name.removesuffix(f", {one['name']}")
+        bound = Bound(row["limit"], row["relation"].startswith(">"), f"{name} [{row['unit']}]")
+        yield name, bound, row["value"]
 
 
 def least(margins: Sequence[Margins], *names: str) -> float:
@@ -265,7 +231,7 @@ def find_tolerances(
     Raises
     ------
     InputError
-        If a run of the line without errors broke, or nothing is judged.
+        If a run of the line without errors broke, nothing is judged, or a criterion has no figure.
     """
     search = _Search(plan, Evaluation(pool, kept), say)
     found: list[Tolerance] = []
@@ -314,11 +280,25 @@ class _Search:
     _seen: dict[str, dict[float, dict[int, list[Margins]]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        task = self.plan.task
-        self.nominal = self._margins([{}])[0]
-        self.criteria = names_of(self.nominal)
-        self.bounds = bounds_of(self._summaries([{}]), task.criteria)
-        for name in self.criteria:
+        task, summaries = self.plan.task, self._summaries([{}])
+        if any(BROKE in summary for summary in summaries):
+            raise InputError(
+                "the case breaks without errors, so that it has no criteria: try it with "
+                "`catenary run`"
+            )
+        for number, one in enumerate(task.criteria):
+            if any(values_of(summary, one.statistic) is None for summary in summaries):
+                raise InputError(
+                    f"criteria.{number}.statistic is {one.statistic}, of which a run of the case "
+                    "without errors has no figure; leave it out, or evaluate a stretch that has one"
+                )
+        self.nominal = [margins_of(summary, task.criteria) for summary in summaries]
+        self.bounds = bounds_of(summaries, task.criteria)
+        if not self.bounds:
+            raise InputError(
+                "the rule books of the scene judge no run of the set: name criteria in the task"
+            )
+        for name in self.bounds:
             if least(self.nominal, name) < 0.0:
                 self.say(f"{name}: not kept without errors")
         random = [
@@ -342,7 +322,7 @@ class _Search:
     def tolerances(self, varied: _Varied) -> list[Tolerance]:
         """Tolerances of some errors for each criterion, and for all at once if there are several
         that the line keeps without errors."""
-        found = [self._tolerance(varied, name) for name in self.criteria]
+        found = [self._tolerance(varied, name) for name in self.bounds]
         held = [one for one in found if one.is_kept]
         if len(held) > 1:
             together = self._by_samples(varied, EACH, *(one.criterion for one in held))
@@ -388,37 +368,34 @@ class _Search:
 
     def _by_samples(self, varied: _Varied, name: str, *criteria: str) -> Tolerance:
         """The tolerance at which enough samples keep all of some criteria."""
-        n = self.samples.n
-        allowed = self.samples.allowed
-        lost: list[float] = []
+        n, allowed = self.samples.n, self.samples.allowed
 
-        def holds(level: float) -> bool:
+        def failures(level: float) -> int:
             failed = self._failures(varied, level, criteria, allowed)
-            if failed:
-                lost.append(level)
-            does = failed <= allowed
             self.say(
                 f"    {varied.name} +-{level:.3g} {varied.unit}: {name} "
-                f"{'kept' if does else 'not kept'}"
+                f"{'kept' if failed <= allowed else 'not kept'}"
             )
-            return does
+            return failed
 
-        level = self._bisect(varied.most, holds)
+        level, lost_at = self._bisect(varied.most, failures, allowed)
         kept = n - self._failures(varied, level, criteria, n) if level else n
         share = least_share(kept, n, self.samples.confidence)
-        lost_at = min(lost, default=None)
         head = name, varied.name, varied.unit
         return Tolerance(*head, level, varied.most, kept, n, share, lost_at=lost_at)
 
-    def _bisect(self, most: float, holds: Callable[[float], bool]) -> float:
-        """The largest level that holds, up to ``most``; 0 always does."""
-        if holds(most):
-            return most
-        low, high = 0.0, most
+    def _bisect(
+        self, most: float, failures: Callable[[float], int], allowed: int
+    ) -> tuple[float, float | None]:
+        """The largest level up to ``most`` at which no more lines fail than are allowed, 0 if there
+        is none, and the least one at which some were seen to fail."""
+        failed = {most: failures(most)}
+        low, high = (0.0, most) if failed[most] > allowed else (most, most)
         while high - low > self.samples.resolution * most:
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if holds(middle) else (low, middle)
-        return low
+            failed[middle] = failures(middle)
+            low, high = (low, middle) if failed[middle] > allowed else (middle, high)
+        return low, min((level for level, n in failed.items() if n), default=None)
 
     def _failures(self, varied: _Varied, level: float, criteria: Sequence[str], enough: int) -> int:
         """Samples that do not keep criteria at a level; counting ends above ``enough``.
@@ -482,17 +459,10 @@ class _Search:
             worst.append(-np.sign(slopes[first, begin : begin + n]))
             begin += n
 
-        lost: list[float] = []
+        def failures(level: float) -> int:
+            return int(least(self._margins([varied.values(level, worst)])[0], criterion) < 0.0)
 
-        def holds(level: float) -> bool:
-            margins = self._margins([varied.values(level, worst)])[0]
-            does = least(margins, criterion) >= 0.0
-            if not does:
-                lost.append(level)
-            return does
-
-        checked = self._bisect(varied.most, holds)
-        return float(levels[first]), checked, min(lost, default=None)
+        return float(levels[first]), *self._bisect(varied.most, failures, 0)
 
     def _slopes(self, varied: _Varied, criterion: str) -> tuple[np.ndarray, np.ndarray]:
         """Margins without errors, (n_margins,), and their slopes by each error over its tolerance

@@ -1,1 +1,1 @@
-"""Uncertainty from a table of runs: quantiles, probabilities of failing, sensitivity indices."""
+"""Uncertainty: samples of a case with uncertain keys; quantiles, failures and indices."""

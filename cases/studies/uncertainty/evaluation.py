@@ -17,9 +17,14 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from catenary.cases.studies.sampling.samples import salib_problem, sample_name
-from catenary.cases.studies.sampling.tables import SALTELLI, ChoicesTable, SamplingTable, SeedTable
 from catenary.cases.studies.uncertainty.run_table import RunTable
+from catenary.cases.studies.uncertainty.samples import salib_problem, sample_name
+from catenary.cases.studies.uncertainty.sampling import (
+    SALTELLI,
+    ChoicesTable,
+    SamplingTable,
+    SeedTable,
+)
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.files.run_schema import DONE
 
@@ -83,18 +88,17 @@ def evaluate(table: RunTable) -> Uncertainty:
     """
     independent = independent_runs(table)
     statistics, quantiles = [], []
-    for name in table.statistics:
-        for pantograph, rows in independent.of(name).items():
-            x = rows[name].dropna().to_numpy(float)
-            if len(x) < 2:
-                continue
-            here = {"statistic": name, "pantograph": pantograph, "n": len(x)}
-            ends = {"minimum": float(x.min()), "maximum": float(x.max())}
-            estimated = _named("mean", mean(x)) | _named("standard_deviation", deviation(x)) | ends
-            statistics.append({**here, **estimated})
-            quantiles += [
-                {**here, "probability": p, **_named("value", quantile(x, p))} for p in QUANTILES
-            ]
+    for here, rows in independent.figures():
+        x = rows[here["statistic"]].dropna().to_numpy(float)
+        if len(x) < 2:
+            continue
+        head = {**here, "n": len(x)}
+        estimated = _named("mean", mean(x)) | _named("standard_deviation", deviation(x))
+        ends = {"minimum": float(x.min()), "maximum": float(x.max())}
+        statistics.append({**head, **estimated, **ends})
+        quantiles += [
+            {**head, "probability": p, **_named("value", quantile(x, p))} for p in QUANTILES
+        ]
     runs = table.runs
     n_done = int((runs["outcome"] == DONE).sum())
     method, sensitivity, notes = indices(table)
@@ -200,12 +204,28 @@ def student(x: np.ndarray) -> Bounded:
 def mean(x: np.ndarray) -> Bounded:
     """Mean with bounds by the bootstrap (BCa, Efron 1987), which stay where values can be.
 
-    Of fewer than ``_FEWEST`` values, or more than ``_MOST_RESAMPLED``, by Student's
-    distribution.
+    They are NaN where values are so alike that resamples show none, and Student's of fewer values
+    than ``_FEWEST`` or more than ``_MOST_RESAMPLED``. Resamples of n values scatter by
+    sqrt((n - 1)/n) too little and are normal where Student's distribution is wider, so that
+    intervals of 95 % would hold the truth in 87 % of ten normal values. They are taken at the
+    greater level that mends both (T. Hesterberg, Am. Stat. 69, 2015, 371, the expanded interval).
     """
-    if np.ptp(x) == 0.0 or not _FEWEST <= len(x) <= _MOST_RESAMPLED:
+    n = len(x)
+    if np.ptp(x) == 0.0 or not _FEWEST <= n <= _MOST_RESAMPLED:
         return student(x)
-    return _bootstrap(x)
+    wider = np.sqrt(n / (n - 1.0)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)
+    level = float(2.0 * stats.norm.cdf(wider) - 1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        found = stats.bootstrap(
+            (x,),
+            np.mean,
+            n_resamples=_RESAMPLES,
+            confidence_level=level,
+            method="BCa",
+            random_state=np.random.default_rng(_SEED),
+        ).confidence_interval
+    return Bounded(float(np.mean(x)), float(found.low), float(found.high))
 
 
 def deviation(x: np.ndarray) -> Bounded:
@@ -228,30 +248,6 @@ def deviation(x: np.ndarray) -> Bounded:
     half = z * factor * np.sqrt((kurtosis - (n - 3.0) / n) / (n - 1.0))
     low, high = value * np.sqrt(factor) * np.exp(0.5 * half * np.array([-1.0, 1.0]))
     return Bounded(value, float(low), float(high))
-
-
-def _bootstrap(x: np.ndarray) -> Bounded:
-    """Mean with BCa bounds; NaN where values are so alike that resamples show none.
-
-    Resamples of n values scatter by sqrt((n - 1)/n) too little and are normal where Student's
-    distribution is wider, so that intervals of 95 % would hold the truth in 87 % of ten normal
-    values. They are taken at the greater level that mends both (T. Hesterberg, Am. Stat. 69, 2015,
-    371, the expanded interval).
-    """
-    n = len(x)
-    wider = np.sqrt(n / (n - 1.0)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)
-    level = float(2.0 * stats.norm.cdf(wider) - 1.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        found = stats.bootstrap(
-            (x,),
-            np.mean,
-            n_resamples=_RESAMPLES,
-            confidence_level=level,
-            method="BCa",
-            random_state=np.random.default_rng(_SEED),
-        ).confidence_interval
-    return Bounded(float(np.mean(x)), float(found.low), float(found.high))
 
 
 def quantile(x: np.ndarray, probability: float) -> Bounded:
@@ -305,36 +301,34 @@ def _sobol(table: RunTable, sampling: SamplingTable) -> tuple[list[dict[str, Any
     names = [sample_name(number + 1) for number in range(sampling.n_samples)]
     rows: list[dict[str, Any]] = []
     notes: dict[str, None] = {}
-    for statistic in table.statistics:
-        for pantograph, own in table.of(statistic).items():
-            y = own.set_index("variant")[statistic].reindex(names).to_numpy(float)
-            blocks = y.reshape(sampling.n, sampling.block)
-            whole = blocks[np.isfinite(blocks).all(axis=1)]
-            if len(whole) < 2:
-                notes["no base sample is complete: there are no Sobol indices"] = None
-                continue
-            if len(whole) < sampling.n:
-                lost = sampling.n - len(whole)
-                notes[f"{lost} of {sampling.n} base samples are incomplete and left out"] = None
-            if np.ptp(whole) == 0.0:
-                continue  # nothing varies
-            with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # resamples without variance
-                found = sobol.analyze(
-                    salib_problem(sampling.columns),
-                    whole.ravel(),
-                    calc_second_order=sampling.second_order,
-                    conf_level=CONFIDENCE,
-                    seed=_SEED,
-                )
-            here = {"statistic": statistic, "pantograph": pantograph}
-            for i, key in enumerate(sampling.columns):
-                row = {name: float(found[name][i]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
-                rows.append({**here, "key": key, **_with_bounds(row)})
-            pairs = combinations(enumerate(sampling.columns), 2) if sampling.second_order else ()
-            for (i, key), (j, other) in pairs:
-                row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
-                rows.append({**here, "key": key, "with": other, **_with_bounds(row)})
+    for here, own in table.figures():
+        y = own.set_index("variant")[here["statistic"]].reindex(names).to_numpy(float)
+        blocks = y.reshape(sampling.n, sampling.block)
+        whole = blocks[np.isfinite(blocks).all(axis=1)]
+        if len(whole) < 2:
+            notes["no base sample is complete: there are no Sobol indices"] = None
+            continue
+        if len(whole) < sampling.n:
+            lost = sampling.n - len(whole)
+            notes[f"{lost} of {sampling.n} base samples are incomplete and left out"] = None
+        if np.ptp(whole) == 0.0:
+            continue  # nothing varies
+        with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # resamples without variance
+            found = sobol.analyze(
+                salib_problem(sampling.columns),
+                whole.ravel(),
+                calc_second_order=sampling.second_order,
+                conf_level=CONFIDENCE,
+                seed=_SEED,
+            )
+        for i, key in enumerate(sampling.columns):
+            row = {name: float(found[name][i]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
+            rows.append({**here, "key": key, **_with_bounds(row)})
+        pairs = combinations(enumerate(sampling.columns), 2) if sampling.second_order else ()
+        for (i, key), (j, other) in pairs:
+            row = {name: float(found[name][i, j]) for name in ("S2", "S2_conf")}
+            rows.append({**here, "key": key, "with": other, **_with_bounds(row)})
     return rows, list(notes)
 
 
@@ -380,22 +374,20 @@ def _given_data(table: RunTable) -> tuple[list[dict[str, Any]], list[str]]:
     if not keys:
         return rows, notes
     few = False
-    for statistic in table.statistics:
-        for pantograph, own in table.of(statistic).items():
-            known = own[own[statistic].notna()]
-            y = known[statistic].to_numpy(float)
-            if len(y) < _FEWEST_RUNS:
-                few = True
-                continue
-            if np.ptp(y) == 0.0:
-                continue
-            x = known[keys].to_numpy(float)
-            found = _rbd_fast(keys, x, y)
-            ranks = known[keys].rank().corrwith(known[statistic].rank())
-            here = {"statistic": statistic, "pantograph": pantograph}
-            for i, key in enumerate(keys):
-                row = {name: float(found[name][i]) for name in ("S1", "S1_conf")}
-                rows.append({**here, "key": key, **row, "rank_correlation": float(ranks[key])})
+    for here, own in table.figures():
+        known = own[own[here["statistic"]].notna()]
+        statistic = known[here["statistic"]]
+        y = statistic.to_numpy(float)
+        if len(y) < _FEWEST_RUNS:
+            few = True
+            continue
+        if np.ptp(y) == 0.0:
+            continue
+        found = _rbd_fast(keys, known[keys].to_numpy(float), y)
+        ranks = known[keys].rank().corrwith(statistic.rank())
+        for i, key in enumerate(keys):
+            row = {name: float(found[name][i]) for name in ("S1", "S1_conf")}
+            rows.append({**here, "key": key, **row, "rank_correlation": float(ranks[key])})
     if few:
         notes.append(f"first-order indices need at least {_FEWEST_RUNS} runs")
     together = table.sampling.correlations if table.sampling is not None else []

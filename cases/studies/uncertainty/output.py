@@ -14,7 +14,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.jobs import STATISTICS
 from catenary.cases.studies.sweep.output import PLOTTED, key_in_words
 from catenary.cases.studies.uncertainty.evaluation import (
@@ -27,6 +26,7 @@ from catenary.cases.studies.uncertainty.evaluation import (
     student,
 )
 from catenary.cases.studies.uncertainty.run_table import RunTable, run_table, sampling_file
+from catenary.cases.studies.uncertainty.sampling import SamplingTable
 from catenary.postproc.evaluate.wording import capital
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Content, StudyTable, alike, write_files

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,9 +12,9 @@ import pandas as pd
 from catenary.base.errors import InputError
 from catenary.base.files import is_file, is_folder
 from catenary.cases.scene.input.plain_text import plain
-from catenary.cases.studies.sampling.tables import ChoicesTable, SamplingTable, sampling_of
 from catenary.cases.studies.sweep.jobs import OF_LINE
 from catenary.cases.studies.sweep.output import PARQUET, TABLE
+from catenary.cases.studies.uncertainty.sampling import ChoicesTable, SamplingTable, sampling_of
 from catenary.postproc.files.run_schema import DONE
 from catenary.postproc.report.study_table import Content
 
@@ -68,6 +68,12 @@ class RunTable(NamedTuple):
         if statistic in {column.name for column in OF_LINE}:
             return {"": done.drop_duplicates("variant")}
         return {str(name): rows for name, rows in done.groupby("pantograph", sort=False)}
+
+    def figures(self) -> Iterator[tuple[dict[str, str], pd.DataFrame]]:
+        """Each statistic with each pantograph, by "statistic" and "pantograph", and their rows."""
+        for statistic in self.statistics:
+            for pantograph, rows in self.of(statistic).items():
+                yield {"statistic": statistic, "pantograph": pantograph}, rows
 
     @property
     def runs(self) -> pd.DataFrame:

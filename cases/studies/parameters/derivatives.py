@@ -6,16 +6,16 @@ scene.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 from catenary.base.errors import InputError
 from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.scene.scene import Scene, problem_of
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
+from catenary.cases.studies.parameters.parameters import ChangedScenes, Parameter, parameters_of
 from catenary.cases.terminal.runs_bar import RunsBar
 from catenary.cases.terminal.terminal_text import elasticity_text
 from catenary.meshgen.wires import Role
@@ -34,6 +34,7 @@ from catenary.solver.tangents.set_up import (
     set_up_of,
 )
 
+T = TypeVar("T")
 # Memory for derivatives of all steps; for further parameters the march is made again [B].
 _BYTES = 2**28
 _MM = 1e3  # in a metre
@@ -54,7 +55,7 @@ _SEEN_HEIGHT_MM = 0.5e-3
 
 @dataclass
 class Sensitivity:
-    """A case differentiated by parameters.
+    """A case differentiated by m parameters.
 
     Attributes
     ----------
@@ -62,13 +63,12 @@ class Sensitivity:
     statistics : "mean", "std", "max" and "min" of the force of each of them below 20 Hz in the
         evaluated stretch [N]
     max_uplift : largest uplift of evaluated arms [m], NaN if there are none
-    parameters : by which it was differentiated
-    by_force : of each parameter, for each pantograph, derivatives of its statistics per unit of the
-        parameter's key
-    by_uplift : of each parameter that of the largest uplift [m]
     n_steps : of the march
     step_m : what it runs in a step
     contact_switches, link_switches : see ``Tangents``
+    parameters : by which it was differentiated
+    by_force : for each pantograph, derivatives (m,) of its statistics per unit of a parameter's key
+    by_uplift : (m,) that of the largest uplift [m]
     left_out : keys of usual parameters by which it cannot be differentiated, and why
     """
 
@@ -79,10 +79,10 @@ class Sensitivity:
     step_m: float
     contact_switches: int
     link_switches: int
-    parameters: list[Parameter] = field(default_factory=list)
-    by_force: list[list[ForceDerivatives]] = field(default_factory=list)
-    by_uplift: list[float] = field(default_factory=list)
-    left_out: dict[str, str] = field(default_factory=dict)
+    parameters: list[Parameter]
+    by_force: list[ForceDerivatives]
+    by_uplift: np.ndarray
+    left_out: dict[str, str]
 
 
 def sensitivity_of(
@@ -115,30 +115,59 @@ def sensitivity_of(
     parameters = parameters_of(scenes, keys, droppers)
     at_rest = sound_rest(scenes.scene)
     now = set_up_of(comm, at_rest)
-    changes: list[Change] = []
-    kept, left_out = [], {}
-    found: Sensitivity | None = None
+    by_force, by_uplift = [], []
     steps = 2 * len(parameters) if shows else 0
     with RunsBar(steps, lambda line: None, what="set-ups and tangents") as bar:
-        for parameter in parameters:
+
+        def change(parameter: Parameter) -> Change:
             try:
-                changes.append(change_by(parameter, scenes, at_rest, now, comm))
-            except InputError as error:
-                if keys or droppers:
-                    raise
-                left_out[parameter.key] = str(error)
-            else:
-                kept.append(parameter)
-            bar.ended()
+                return change_by(parameter, scenes, at_rest, now, comm)
+            finally:
+                bar.ended()
+
+        kept, changes, left_out = _by_each(parameters, change, bool(keys) or droppers)
         for part in parts_of(changes, at_rest, now):
             marched = march_with_tangents(comm, at_rest, changes[part])
-            if found is None:
-                found = _without_parameters(marched, at_rest)
-            _add_derivatives(found, marched, at_rest, kept[part])
-            bar.ended(len(kept[part]))
-    assert found is not None
-    found.left_out = left_out
-    return found
+            figures, by_part = _forces(marched, at_rest)
+            by_force.append(by_part)
+            by_uplift.append(statistics.largest_derivatives(marched.uplift, marched.by_uplift))
+            bar.ended(len(changes[part]))
+    order = np.argsort([place.behind for place in at_rest.problem.train.placements], kind="stable")
+    names = places_on_train(len(order))
+    return Sensitivity(
+        [names[place] for place in np.argsort(order)],
+        figures,
+        float(marched.uplift.max()) if marched.uplift.size else float("nan"),
+        len(marched.force),
+        marched.speed * marched.dt,
+        marched.contact_switches,
+        marched.link_switches,
+        kept,
+        [
+            ForceDerivatives(*map(np.concatenate, zip(*own, strict=True)))
+            for own in zip(*by_force, strict=True)
+        ],
+        np.concatenate(by_uplift),
+        left_out,
+    )
+
+
+def _by_each(
+    parameters: Sequence[Parameter], derive: Callable[[Parameter], T], named: bool
+) -> tuple[list[Parameter], list[T], dict[str, str]]:
+    """The parameters by which ``derive`` finds something, and that; keys of others, and why it
+    finds nothing by them, which of ``named`` ones is raised."""
+    kept, found, left_out = [], [], {}
+    for parameter in parameters:
+        try:
+            found.append(derive(parameter))
+        except InputError as error:
+            if named:
+                raise
+            left_out[parameter.key] = str(error)
+        else:
+            kept.append(parameter)
+    return kept, found, left_out
 
 
 def change_by(
@@ -185,70 +214,35 @@ def parts_of(changes: Sequence[Change], at_rest: LineAtRest, now: SetUp) -> Iter
         yield slice(first, first + most)
 
 
-def _without_parameters(marched: Tangents, at_rest: LineAtRest) -> Sensitivity:
-    statistics = []
-    for number, within in _within(marched, at_rest):
-        force = filters.low_pass(_from_start(marched.force[:, number]), marched.dt)[within]
-        figures = ("mean", "std", "max", "min")
-        statistics.append({name: float(getattr(force, name)()) for name in figures})
-    n = len(statistics)
-    names = places_on_train(n)
-    order = np.argsort([place.behind for place in at_rest.problem.train.placements], kind="stable")
-    return Sensitivity(
-        [names[int(place)] for place in np.argsort(order)],
-        statistics,
-        float(marched.uplift.max()) if marched.uplift.size else float("nan"),
-        len(marched.force),
-        marched.speed * marched.dt,
-        marched.contact_switches,
-        marched.link_switches,
+def _forces(
+    marched: Tangents, at_rest: LineAtRest
+) -> tuple[list[dict[str, float]], list[ForceDerivatives]]:
+    """Statistics of the force of each pantograph, and their derivatives."""
+    # The filter meets both ends of a record: a run's begins a step earlier, without a force.
+    back, by_position = marched.speed * marched.dt, marched.by_position
+    positions = np.concatenate([marched.position[:1] - back, marched.position])
+    forces, by_forces = (
+        np.concatenate([np.zeros_like(own[:1]), own]) for own in (marched.force, marched.by_force)
     )
-
-
-def _within(marched: Tangents, at_rest: LineAtRest) -> Iterator[tuple[int, np.ndarray]]:
-    """Each pantograph's number, and in which records of a run it is in the evaluated stretch."""
+    by_places = np.concatenate([2.0 * by_position[:1] - by_position[1:2], by_position])
+    by_places /= marched.speed
     first, last = at_rest.problem.evaluation
-    for number in range(marched.force.shape[1]):
-        position = marched.position[:, number]
-        position = np.concatenate([position[:1] - marched.speed * marched.dt, position])
+    figures, derivatives = [], []
+    for number, (position, force) in enumerate(zip(positions.T, forces.T, strict=True)):
         if not covers(position, (first, last)):
             raise InputError(
                 f"a pantograph runs from {position[0]:.0f} to {position[-1]:.0f} m, and not "
                 f"through the evaluation stretch from {first:.0f} to {last:.0f} m"
             )
-        yield number, (position >= first) & (position <= last)
-
-
-def _from_start(values: np.ndarray) -> np.ndarray:
-    """Forces of all steps, or their derivatives, with what the record of a run begins with: none at
-    the start. The filter meets both ends of a record."""
-    return np.concatenate([np.zeros_like(values[:1]), values])
-
-
-def _add_derivatives(
-    found: Sensitivity, marched: Tangents, at_rest: LineAtRest, parameters: list[Parameter]
-) -> None:
-    """Add the derivatives of a march by some parameters."""
-    by_position = marched.by_position
-    by_place = np.concatenate([2.0 * by_position[:1] - by_position[1:2], by_position])
-    by_place /= marched.speed
-    of_all = [
-        statistics.force_derivatives(
-            _from_start(marched.force[:, number]),
-            _from_start(marched.by_force[:, :, number]),
-            within,
-            marched.dt,
-            by_place[:, :, number],
+        within = (position >= first) & (position <= last)
+        evaluated = filters.low_pass(force, marched.dt)[within]
+        names = ("mean", "std", "max", "min")
+        figures.append({name: float(getattr(evaluated, name)()) for name in names})
+        by_force, by_place = by_forces[:, :, number], by_places[:, :, number]
+        derivatives.append(
+            statistics.force_derivatives(force, by_force, within, marched.dt, by_place)
         )
-        for number, within in _within(marched, at_rest)
-    ]
-    by_uplift = statistics.largest_derivatives(marched.uplift, marched.by_uplift)
-    for place, parameter in enumerate(parameters):
-        found.parameters.append(parameter)
-        found.by_force.append(
-            [ForceDerivatives(*(values[place] for values in own)) for own in of_all]
-        )
-        found.by_uplift.append(float(by_uplift[place]))
+    return figures, derivatives
 
 
 def table_of(found: Sensitivity) -> StudyTable:
@@ -271,32 +265,29 @@ def table_of(found: Sensitivity) -> StudyTable:
         Column(_BY_PERCENT, "sigma by 1 % [N]", "+.4f"),
     ]
 
-    def weight(number: int) -> float:
-        ranked = _BY_PERCENT if found.parameters[number].size else "std_change_N"
-        return max(abs(row[ranked]) for row in _rows(found, number))
+    def weight(rows: list[dict[str, Any]]) -> float:
+        ranked = "std_change_N" if rows[0][_BY_PERCENT] is None else _BY_PERCENT
+        return max(abs(row[ranked]) for row in rows)
 
-    order = sorted(range(len(found.parameters)), key=weight, reverse=True)
-    return StudyTable(columns, [row for number in order for row in _rows(found, number)])
+    ranked = sorted(_rows(found), key=weight, reverse=True)
+    return StudyTable(columns, [row for rows in ranked for row in rows])
 
 
-def _rows(found: Sensitivity, number: int) -> list[dict[str, Any]]:
-    parameter = found.parameters[number]
-    change, uplift = parameter.change, found.by_uplift[number]
-    rows = []
-    for name, own in zip(found.names, found.by_force[number], strict=True):
-        row: dict[str, Any] = {
-            "parameter": parameter.key,
-            "shown": parameter.text,
-            "value": parameter.values[0] if len(parameter.values) == 1 else [*parameter.values],
-            "unit": parameter.unit,
-            "pantograph": name,
-            "change": change,
-        }
-        row |= {column: change * float(getattr(own, of)) for column, (of, _) in _FORCES.items()}
-        row["max_uplift_change_mm"] = None if np.isnan(uplift) else change * uplift * _MM
-        row[_BY_PERCENT] = 0.01 * parameter.size * float(own.std) if parameter.size else None
-        rows.append(row)
-    return rows
+def _rows(found: Sensitivity) -> list[list[dict[str, Any]]]:
+    """Of each parameter a row for each pantograph."""
+    every = []
+    for number, parameter in enumerate(found.parameters):
+        change, uplift = parameter.change, float(found.by_uplift[number])
+        moved = None if np.isnan(uplift) else change * uplift * _MM
+        head = {**parameter.cells, "max_uplift_change_mm": moved}
+        rows = []
+        for name, by_force in zip(found.names, found.by_force, strict=True):
+            by = {of: float(own[number]) for of, own in by_force._asdict().items()}
+            percent = 0.01 * parameter.size * by["std"] if parameter.size else None
+            changes = {column: change * by[of] for column, (of, _) in _FORCES.items()}
+            rows.append({**head, "pantograph": name, **changes, _BY_PERCENT: percent})
+        every.append(rows)
+    return every
 
 
 def as_text(found: Sensitivity) -> str:
@@ -322,9 +313,9 @@ def _idle(found: Sensitivity) -> list[str]:
     """A sentence on the parameters whose rows have nothing but zeros."""
     figures = [*_FORCES, "max_uplift_change_mm", _BY_PERCENT]
     idle = [
-        parameter.key
-        for number, parameter in enumerate(found.parameters)
-        if all(abs(row[name] or 0.0) < _SEEN for row in _rows(found, number) for name in figures)
+        rows[0]["parameter"]
+        for rows in _rows(found)
+        if all(abs(row[name] or 0.0) < _SEEN for row in rows for name in figures)
     ]
     return [f"Without effect in the digits above: {', '.join(idle)}.\n"] if idle else []
 
@@ -380,7 +371,7 @@ class RestSensitivity:
     parameters: list[Parameter]
     by_height: np.ndarray
     by_elasticity: np.ndarray
-    left_out: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, str]
 
     @property
     def by_non_uniformity(self) -> np.ndarray:
@@ -414,21 +405,17 @@ def rest_sensitivity_of(
     named = bool(keys) or droppers
     at_rest = sound_rest(scene)
     now = _rest_numbers(at_rest)
-    parameters, found, left_out = [], [], {}
-    for parameter in parameters_of(scenes, keys, droppers):
-        if parameter.is_of_train and not named:
-            continue
-        try:
-            own = _rest_derivative(parameter, scenes, at_rest)
-        except InputError as error:
-            if named:
-                raise
-            left_out[parameter.key] = str(error)
-            continue
-        if named or np.nan_to_num(own).any():  # damping changes nothing at rest
-            parameters.append(parameter)
-            found.append(own)
+    parameters = [
+        one for one in parameters_of(scenes, keys, droppers) if named or not one.is_of_train
+    ]
+    parameters, found, left_out = _by_each(
+        parameters, lambda one: _rest_derivative(one, scenes, at_rest), named
+    )
     derivatives = np.array(found).reshape(-1, *now.shape)
+    if not named:  # damping changes nothing at rest
+        moves = np.nan_to_num(derivatives).any(axis=(1, 2))
+        parameters = [one for one, does in zip(parameters, moves, strict=True) if does]
+        derivatives = derivatives[moves]
     return RestSensitivity(
         [wire.name for wire in at_rest.problem.line.wires_of(Role.CONTACT)],
         at_rest.lift.x,
@@ -486,9 +473,7 @@ def along_span(found: RestSensitivity) -> StudyTable:
     )]  # fmt: skip
     rows = [
         {
-            "parameter": parameter.key,
-            "unit": parameter.unit,
-            "change": parameter.change,
+            **parameter.cells,
             "wire": wire,
             "x_m": float(found.x[i]),
             "height_m": float(found.height[i, j]),
@@ -523,10 +508,7 @@ def _rest_table(found: RestSensitivity) -> StudyTable:
         height = _MM * change * float(moved[place, wire])
         rows.append(
             {
-                "parameter": parameter.key,
-                "shown": parameter.text,
-                "unit": parameter.unit,
-                "change": change,
+                **parameter.cells,
                 "height": height,
                 "at": float(found.x[place]) if abs(height) >= _SEEN_HEIGHT_MM else None,
                 "mean": 100.0

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from catenary.cases.studies.identification.measurement import UNITS
-from catenary.cases.studies.identification.posterior import RARE, Judged, is_doubtful
-from catenary.cases.studies.identification.study import Identification
+from catenary.cases.studies.parameters.identification import Identification
+from catenary.cases.studies.parameters.measurement import UNITS
+from catenary.cases.studies.parameters.posterior import RARE, Judged, is_doubtful
 from catenary.postproc.evaluate.wording import without_sign_of_zero
 from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import Column, Content, StudyTable, file_table

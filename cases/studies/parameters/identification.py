@@ -13,8 +13,9 @@ Levenberg-Marquardt algorithm* (1978), which SciPy's MINPACK follows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,14 +26,18 @@ from scipy.optimize import OptimizeResult, least_squares
 from catenary.base.errors import CatenaryError, InputError
 from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.scene.scene import Scene, problem_of
-from catenary.cases.studies.identification.measurement import (
+from catenary.cases.studies.measured import read_table
+from catenary.cases.studies.parameters.derivatives import change_by, parts_of
+from catenary.cases.studies.parameters.measurement import (
     FORCE,
+    HEIGHT,
     UNITS,
     Measurement,
     Signal,
     Task,
 )
-from catenary.cases.studies.identification.posterior import (
+from catenary.cases.studies.parameters.parameters import ChangedScenes, Parameter
+from catenary.cases.studies.parameters.posterior import (
     Judged,
     Posterior,
     innovations_of,
@@ -40,9 +45,6 @@ from catenary.cases.studies.identification.posterior import (
     judge,
     posterior_of,
 )
-from catenary.cases.studies.measured import read_table
-from catenary.cases.studies.sensitivity.derivatives import change_by, parts_of
-from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter
 from catenary.postproc.evaluate.filters import check_sampling
 from catenary.postproc.evaluate.wording import counted
 from catenary.solver.statics.line_at_rest import LineAtRest
@@ -69,12 +71,14 @@ class Unknown(NamedTuple):
     name : a key of the scene, or "bias of ..."
     unit : of the values
     mean, deviation : of the prior
+    parameter : of the scene, None of a bias
     """
 
     name: str
     unit: str
     mean: float
     deviation: float
+    parameter: Parameter | None = None
 
 
 @dataclass(frozen=True)
@@ -149,56 +153,46 @@ def identify(
     """
     check_sampling(scene.numerics.dt_s, task.measured.filter_Hz)
     scenes = ChangedScenes(scene)
-    parameters, unknowns = _sought(scenes, task)
-    measurement = _measurement(scene, measured, task)
-    offsets = np.array(
-        [one.mean - _origin(own) for own, one in zip(parameters, unknowns, strict=True)]
-    )
-    biases = [
-        Unknown(_bias_of(one.name), one.unit, 0.0, one.bias / one.factor)
-        for one in measurement.signals
-        if one.bias
-    ]
-    unknowns += biases
-    march = FittedMarch(scenes, parameters, measurement, comm)
-    compared = _Compared(march, measurement.signals, unknowns, offsets, progress)
-    searches = _searches(compared, len(unknowns), task.starts, progress)
-    found = searches[0]
-    compared.residual(found.x)  # the march that was found
+    sought, measurement = _sought(scenes, task), _measurement(scene, measured, task)
+    march = FittedMarch(scenes, sought, measurement, comm, progress)
+    searches = _searches(march, task.starts, progress)
+    found, unknowns = searches[0], march.unknowns
+    march.residual(found.x)  # the march that was found
+    deviations = np.array([one.deviation for one in unknowns])
     return Identification(
         unknowns,
-        np.array([one.mean for one in unknowns])
-        + found.x * np.array([one.deviation for one in unknowns]),
-        posterior_of(compared.jacobian(found.x)),
+        np.array([one.mean for one in unknowns]) + found.x * deviations,
+        posterior_of(march.jacobian(found.x)),
         measurement.place,
         measurement.signals,
-        compared.modelled,
-        compared.by_priors,
-        compared.marched,
-        compared.judged(found),
-        compared.n_marches,
-        compared.n_jacobians,
+        march.modelled,
+        march.by_priors,
+        march.marched,
+        march.judged(found),
+        march.n_marches,
+        march.n_jacobians,
         [2.0 * one.cost for one in searches],
         bool(found.status > 0),
     )
 
 
 def _searches(
-    compared: _Compared, m: int, starts: int | None, progress: Callable[[str], None]
+    march: FittedMarch, starts: int | None, progress: Callable[[str], None]
 ) -> list[OptimizeResult]:
-    """Searches for m unknowns from the priors' means and from draws of the priors, the best first.
+    """Searches from the priors' means and from draws of the priors, the best first.
 
     Droppers that slacken make kinks, between which a search may be caught. A draw whose line cannot
     hang, or whose march breaks, is left out.
     """
-    rng, found = np.random.default_rng(_SEED), [_search(compared, np.zeros(m))]
+    m = len(march.unknowns)
+    rng, found = np.random.default_rng(_SEED), [_search(march, np.zeros(m))]
     if starts is None:
-        starts = _SEARCHES_IN_DOUBT if is_doubtful(compared.judged(found[0])) else 1
+        starts = _SEARCHES_IN_DOUBT if is_doubtful(march.judged(found[0])) else 1
     if starts > 1:
         progress(f"search 1 of {starts}: sum of squares {2.0 * found[0].cost:.1f}")
     for number in range(2, starts + 1):
         try:
-            found.append(_search(compared, rng.normal(size=m)))
+            found.append(_search(march, rng.normal(size=m)))
         except CatenaryError as error:
             progress(f"search {number} of {starts} broke: {error}")
             continue
@@ -206,11 +200,11 @@ def _searches(
     return sorted(found, key=lambda one: float(one.cost))
 
 
-def _search(compared: _Compared, start: np.ndarray) -> OptimizeResult:
+def _search(march: FittedMarch, start: np.ndarray) -> OptimizeResult:
     return least_squares(
-        lambda at: np.concatenate([compared.residual(at), at]),
+        lambda at: np.concatenate([march.residual(at), at]),
         start,
-        lambda at: np.concatenate([-compared.jacobian(at), np.eye(start.size)]),
+        lambda at: np.concatenate([-march.jacobian(at), np.eye(start.size)]),
         method="lm",
         ftol=_TOLERANCE,
         xtol=_TOLERANCE,
@@ -258,214 +252,179 @@ def _origin(parameter: Parameter) -> float:
     return parameter.values[0] if len(parameter.values) == 1 else 0.0
 
 
-def _sought(scenes: ChangedScenes, task: Task) -> tuple[list[Parameter], list[Unknown]]:
+def _sought(scenes: ChangedScenes, task: Task) -> list[Unknown]:
     """The parameters of the scene that are looked for, and their priors."""
-    parameters, unknowns = [], []
+    found = []
     for number, one in enumerate(task.parameters):
         parameter = scenes.parameter(one.key, f"in parameters.{number}.key of the task")
-        own = _origin(parameter)
         if one.mean is not None and len(parameter.values) > 1:
             raise InputError(
                 f"parameters.{number}.mean must be left out: {one.key} is a list whose entries "
                 "change together from the scene's values"
             )
-        mean = own if one.mean is None else one.mean
-        parameters.append(parameter)
-        unknowns.append(Unknown(one.key, parameter.unit, mean, one.deviation))
-    of_shape: list[tuple[Parameter, float]] = []
+        mean = _origin(parameter) if one.mean is None else one.mean
+        found.append(Unknown(one.key, parameter.unit, mean, one.deviation, parameter))
+    of_shape = []
     if task.droppers is not None:
-        droppers = scenes.droppers_of(task.droppers.spans)
-        of_shape += ((one, task.droppers.deviation_mm) for one in droppers)
+        of_shape.append((scenes.droppers_of(task.droppers.spans), task.droppers.deviation_mm))
     if task.heights is not None:
-        heights = scenes.heights_at(task.heights.supports)
-        of_shape += ((one, task.heights.deviation_mm) for one in heights)
-    for parameter, deviation in of_shape:
-        parameters.append(parameter)
-        own = parameter.values[0]
-        unknowns.append(Unknown(parameter.key, parameter.unit, own, deviation))
-    keys = [one.name for one in unknowns]
+        of_shape.append((scenes.heights_at(task.heights.supports), task.heights.deviation_mm))
+    for several, deviation in of_shape:
+        found += [Unknown(own.key, own.unit, own.values[0], deviation, own) for own in several]
+    keys = [one.name for one in found]
     for key in keys:
         if keys.count(key) > 1:
             raise InputError(f"the task names {key} twice; name it once")
-    return parameters, unknowns
-
-
-class _Compared:
-    """Residuals and Jacobians by what is looked for, in deviations of noise and priors."""
-
-    def __init__(
-        self,
-        march: FittedMarch,
-        signals: Sequence[Signal],
-        unknowns: Sequence[Unknown],
-        offsets: np.ndarray,
-        progress: Callable[[str], None],
-    ) -> None:
-        self._march, self._signals, self._offsets = march, signals, offsets
-        self._progress = progress
-        self._deviations = np.array([one.deviation for one in unknowns[: offsets.size]])
-        self._n = len(unknowns)
-        self.n_marches, self.n_jacobians = 0, 0
-        # The latest of each with its place, which searches ask for several times.
-        self._residual: tuple[bytes, np.ndarray] | None = None
-        self._jacobian: tuple[bytes, np.ndarray] | None = None
-        self.modelled: list[np.ndarray] = []
-        self.by_priors: list[np.ndarray] = []  # the first march, with the priors' means
-        self.marched: list[np.ndarray] = []
-
-    def residual(self, at: np.ndarray) -> np.ndarray:
-        """Measured less modelled samples of all signals, made independent."""
-        if self._residual is None or self._residual[0] != at.tobytes():
-            self.n_marches += 1
-            self._residual = at.tobytes(), self._made_residual(at)
-        return self._residual[1]
-
-    def jacobian(self, at: np.ndarray) -> np.ndarray:
-        """Derivatives of the modelled samples, made independent."""
-        if self._jacobian is None or self._jacobian[0] != at.tobytes():
-            self.n_jacobians += 1
-            if self._offsets.size:
-                self._progress(f"derivatives by {counted(self._offsets.size, 'parameter')}")
-            self._jacobian = at.tobytes(), self._made_jacobian(at)
-        return self._jacobian[1]
-
-    def judged(self, found: OptimizeResult) -> dict[str, Judged]:
-        """Residuals of each signal and of "all" where a search came to."""
-        n = len(found.fun) - self._n
-        own = n // len(self._signals)
-        moved = innovations_of(found.fun[:n], -found.jac[:n], found.x)
-        names = {one.name: slice(k * own, (k + 1) * own) for k, one in enumerate(self._signals)}
-        return judge(moved, names)
-
-    def _made_residual(self, at: np.ndarray) -> np.ndarray:
-        self.modelled, self.marched = self._march.values(self._by(at))
-        if not self.by_priors:
-            self.by_priors = self.marched
-            _refuse_other_units(self._signals, self.modelled)
-        biases = iter(at[self._offsets.size :])
-        found = np.concatenate(
-            [
-                one.whitening.of(
-                    one.values - modelled - (one.bias * next(biases) if one.bias else 0.0)
-                )
-                for one, modelled in zip(self._signals, self.modelled, strict=True)
-            ]
-        )
-        self._progress(f"march {self.n_marches}: sum of squares {found @ found + at @ at:.1f}")
-        return found
-
-    def _made_jacobian(self, at: np.ndarray) -> np.ndarray:
-        found = self._march.derivatives(self._by(at)) if self._offsets.size else []
-        rows, bias = [], self._offsets.size
-        for number, one in enumerate(self._signals):
-            own = np.zeros((one.values.size, self._n))
-            if found:
-                own[:, : self._offsets.size] = found[number] * self._deviations
-            if one.bias:
-                own[:, bias] = one.bias
-                bias += 1
-            rows.append(one.whitening.of(own))
-        return np.concatenate(rows)
-
-    def _by(self, at: np.ndarray) -> list[float]:
-        """Changes of the parameters of the scene, in their units."""
-        return list(self._offsets + self._deviations * at[: self._offsets.size])
+    return found
 
 
 class FittedMarch:
-    """Marches of a scene whose parameters are changed. Not collective: one process.
+    """The march of a scene whose parameters are changed, compared with a measurement.
+
+    Residuals and Jacobians are in deviations of noise and priors. Not collective: one process.
+
+    Attributes
+    ----------
+    unknowns : parameters of the scene, and biases of the signals
+    modelled : of each signal the samples (n,) of the latest march, without biases
+    by_priors, marched : of each signal places and values (2, k) of the steps of the first march,
+        with the priors' means, and of the latest one
+    n_marches, n_jacobians : how many were made
 
     Parameters
     ----------
     scenes : the scene, unchanged
-    parameters : m of it
+    sought : m parameters of it
     measurement : which samples of a march are compared
     comm : mpi4py communicator of this process alone
+    progress : called with a line on each march
     """
 
     def __init__(
         self,
         scenes: ChangedScenes,
-        parameters: Sequence[Parameter],
+        sought: Sequence[Unknown],
         measurement: Measurement,
         comm: Any,
+        progress: Callable[[str], None] = lambda line: None,
     ) -> None:
-        self._scenes, self._parameters = scenes, parameters
-        self._measurement, self._comm = measurement, comm
+        self._scenes, self._measurement, self._comm = scenes, measurement, comm
+        self._progress, self._signals = progress, measurement.signals
+        self._parameters = [one.parameter for one in sought if one.parameter is not None]
+        origins = [_origin(one) for one in self._parameters]
+        self._offsets = np.array([one.mean for one in sought]) - origins
+        self._deviations = np.array([one.deviation for one in sought])
+        biased = [number for number, one in enumerate(self._signals) if one.bias]
+        self.unknowns = [*sought]
+        for one in (self._signals[number] for number in biased):
+            self.unknowns.append(Unknown(_bias_of(one.name), one.unit, 0.0, one.bias / one.factor))
+        # Derivatives of all samples of a signal by the unknowns that are biases.
+        self._by_bias = np.zeros((len(self._signals), len(self.unknowns)))
+        self._by_bias[biased, len(sought) :] = np.diag([self._signals[k].bias for k in biased])
         self._kept: dict[str, Change] = {}
+        self.n_marches, self.n_jacobians = 0, 0
+        self.modelled: list[np.ndarray] = []
+        self.by_priors: list[np.ndarray] = []
+        self.marched: list[np.ndarray] = []
+        # Searches ask for the latest ones several times.
+        self._residual = lru_cache(1)(self._made_residual)
+        self._jacobian = lru_cache(1)(self._made_jacobian)
 
-    def values(self, by: Sequence[float]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Samples (n,) of each signal, with the parameters changed ``by`` (m,) in their units, and
-        the places and values (2, k) of its steps between them.
+    def residual(self, at: np.ndarray) -> np.ndarray:
+        """Measured less modelled samples of all signals, made independent.
 
-        Raises
-        ------
-        InputError
-            If the scene refuses these values.
-        RunBroken
-            If the march breaks.
+        Raises InputError if the scene refuses the values, RunBroken if the march breaks.
         """
-        marched = march_with_tangents(self._comm, self._at_rest(by), [])
-        position, dt = marched.position[:, self._number], marched.dt
-        of_all = [values for values, _ in self._signals(marched)]
-        samples = [self._measurement.of_march(position, one, dt) for one in of_all]
-        return samples, [self._measurement.curve_of_march(position, one, dt) for one in of_all]
+        return self._residual(at.tobytes())
+
+    def jacobian(self, at: np.ndarray) -> np.ndarray:
+        """Derivatives of the modelled samples, made independent."""
+        return self._jacobian(at.tobytes())
+
+    def judged(self, found: OptimizeResult) -> dict[str, Judged]:
+        """Residuals of each signal and of "all" where a search came to."""
+        n = len(found.fun) - len(self.unknowns)
+        own = n // len(self._signals)
+        moved = innovations_of(found.fun[:n], -found.jac[:n], found.x)
+        names = {one.name: slice(k * own, (k + 1) * own) for k, one in enumerate(self._signals)}
+        return judge(moved, names)
 
     def derivatives(self, by: Sequence[float]) -> list[np.ndarray]:
-        """Derivatives (n, m) of the samples of each signal by the parameters, per their units.
+        """Derivatives (n, m) of the samples of each signal by the parameters, per their units,
+        which are changed ``by`` (m,) in these.
 
-        Raises
-        ------
-        InputError
-            Also if a parameter is none that a march can be differentiated by.
+        Raises InputError if a parameter is none that a march can be differentiated by.
         """
-        at_rest = self._at_rest(by)
+        scene = self._changed(by)
+        at_rest = sound_rest(scene)
         now = set_up_of(self._comm, at_rest)
-        changes = self._changes(by, at_rest, now)
-        parts: list[list[np.ndarray]] = []
+        changes = self._changes(ChangedScenes(scene), at_rest, now)
+        parts = []
         for part in parts_of(changes, at_rest, now):
             marched = march_with_tangents(self._comm, at_rest, changes[part])
-            position = marched.position[:, self._number]
-            parts.append(
-                [
-                    self._measurement.of_march(position, by_parameters, marched.dt)
-                    for _, by_parameters in self._signals(marched)
-                ]
-            )
+            own = {FORCE: marched.by_force, HEIGHT: marched.by_head_height}
+            parts.append(self._of_march(marched, own, self._measurement.of_march))
         return [np.concatenate(own, axis=1) for own in zip(*parts, strict=True)]
 
-    @property
-    def _number(self) -> int:
-        return self._measurement.pantograph
-
-    def _signals(self, marched: Tangents) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Values of each signal in all steps, and their derivatives (n_steps, m)."""
-        number, found = self._number, []
-        for signal in self._measurement.signals:
-            if signal.name == FORCE:
-                pair = (marched.force[:, number], marched.by_force[:, :, number])
-            else:
-                pair = (marched.head_height[:, number], marched.by_head_height[:, :, number])
-            found.append(pair)
+    def _made_residual(self, key: bytes) -> np.ndarray:
+        at = np.frombuffer(key)
+        self.n_marches += 1
+        at_rest = sound_rest(self._changed(self._by(at)))
+        marched = march_with_tangents(self._comm, at_rest, [])
+        own = {FORCE: marched.force, HEIGHT: marched.head_height}
+        self.modelled = self._of_march(marched, own, self._measurement.of_march)
+        self.marched = self._of_march(marched, own, self._measurement.curve_of_march)
+        if not self.by_priors:
+            self.by_priors = self.marched
+            _refuse_other_units(self._signals, self.modelled)
+        of_all = zip(self._signals, self.modelled, self._by_bias @ at, strict=True)
+        found = np.concatenate(
+            [one.whitening.of(one.values - modelled - bias) for one, modelled, bias in of_all]
+        )
+        self._progress(f"march {self.n_marches}: sum of squares {found @ found + at @ at:.1f}")
         return found
 
+    def _made_jacobian(self, key: bytes) -> np.ndarray:
+        self.n_jacobians += 1
+        m, n = self._offsets.size, self._measurement.place.size
+        found = [np.tile(by_bias, (n, 1)) for by_bias in self._by_bias]
+        if m:
+            self._progress(f"derivatives by {counted(m, 'parameter')}")
+            by = self.derivatives(self._by(np.frombuffer(key)))
+            for columns, own in zip(found, by, strict=True):
+                columns[:, :m] = own * self._deviations
+        whitened = zip(self._signals, found, strict=True)
+        return np.concatenate([one.whitening.of(columns) for one, columns in whitened])
+
+    def _of_march(
+        self,
+        marched: Tangents,
+        values: Mapping[str, np.ndarray],
+        taken: Callable[[np.ndarray, np.ndarray, float], np.ndarray],
+    ) -> list[np.ndarray]:
+        """What is ``taken`` of the values of a march, (n_steps, ..., n_pantographs), for each
+        signal."""
+        number = self._measurement.pantograph
+        position = marched.position[:, number]
+        return [taken(position, values[one.name][..., number], marched.dt) for one in self._signals]
+
+    def _by(self, at: np.ndarray) -> list[float]:
+        """Changes of the parameters of the scene, in their units."""
+        return list(self._offsets + self._deviations * at[: self._offsets.size])
+
     def _changed(self, by: Sequence[float]) -> Scene:
-        pairs = list(zip(self._parameters, by, strict=True))
         try:
-            return self._scenes.all_changed(pairs)
+            return self._scenes.all_changed(list(zip(self._parameters, by, strict=True)))
         except InputError as error:
             raise InputError(
                 f"the search comes to a value that the scene refuses: {error}; mean or "
                 "deviation of its prior may be too large"
             ) from error
 
-    def _at_rest(self, by: Sequence[float]) -> LineAtRest:
-        return sound_rest(self._changed(by))
-
-    def _changes(self, by: Sequence[float], at_rest: LineAtRest, now: SetUp) -> list[Change]:
+    def _changes(self, scenes: ChangedScenes, at_rest: LineAtRest, now: SetUp) -> list[Change]:
         """Derivatives of the set-up. Those in which the line at rest is linear are kept from the
         first ones."""
-        scenes, changes = ChangedScenes(self._changed(by)), []
+        changes = []
         for parameter in self._parameters:
             key = parameter.key
             change = self._kept.get(key)

@@ -19,7 +19,14 @@ from catenary.cases.scene.input.csv_files import file_key_of
 from catenary.cases.scene.keys.keys import list_of
 from catenary.cases.scene.line.line_data import span_lengths, staggered
 from catenary.cases.scene.scene import Scene, line_of, resolved
-from catenary.cases.studies.sampling.tables import (
+from catenary.cases.studies.sweep.variants import (
+    Variant,
+    is_number,
+    refuse_idle,
+    share_a_value,
+    text_of,
+)
+from catenary.cases.studies.uncertainty.sampling import (
     SALTELLI,
     ChanceField,
     ChoicesTable,
@@ -32,13 +39,6 @@ from catenary.cases.studies.sampling.tables import (
     inverse,
     seeds,
     takes_mean,
-)
-from catenary.cases.studies.sweep.variants import (
-    Variant,
-    is_number,
-    refuse_idle,
-    share_a_value,
-    text_of,
 )
 from catenary.meshgen.line import Line
 

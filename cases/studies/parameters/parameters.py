@@ -25,7 +25,7 @@ from catenary.base.errors import InputError
 from catenary.base.options import option
 from catenary.cases.run.at_rest import rest_of
 from catenary.cases.run.scene_mesh import mesh_of
-from catenary.cases.scene.input.case_files import value_at
+from catenary.cases.scene.input.case_files import assign, value_at
 from catenary.cases.scene.input.faults import Origin, shown
 from catenary.cases.scene.keys.units import length_from_mm, unit_of
 from catenary.cases.scene.load import scene_from
@@ -156,9 +156,16 @@ class Parameter:
         return _CHANGES.get(self.unit, 0.01 * self.size or 1.0)
 
     @property
-    def text(self) -> str:
-        """Its value where people read it."""
-        return f"{self.values[0]:g}" if len(self.values) == 1 else f"{len(self.values)} values"
+    def cells(self) -> dict[str, Any]:
+        """What tables of changes say of it, its value as people read it under "shown"."""
+        one = len(self.values) == 1
+        return {
+            "parameter": self.key,
+            "shown": f"{self.values[0]:g}" if one else f"{len(self.values)} values",
+            "value": self.values[0] if one else [*self.values],
+            "unit": self.unit,
+            "change": self.change,
+        }
 
 
 class ChangedScenes:
@@ -184,9 +191,12 @@ class ChangedScenes:
 
     def all_changed(self, changes: Sequence[tuple[Parameter, float]]) -> Scene:
         """The scene with several parameters changed, each by a number."""
-        raw = copy.deepcopy(self._raw)
+        raw = dict(self._raw)
         for parameter, by in changes:
-            _change(raw, self.scene, parameter, by)
+            key, value = _changed(raw, self.scene, parameter, by)
+            assign(raw, key, value)
+            if parameter.is_of_shape:
+                assign(raw, f"effects.{key.split('.')[1]}", True)
         return self._checked(raw)
 
     def rest(self, parameter: Parameter, by: float) -> LineAtRest:
@@ -368,32 +378,23 @@ class ChangedScenes:
         return scene_from(raw, Origin("the scene", (), recorded=True), folder=Path.cwd())
 
 
-def _change(raw: dict[str, Any], scene: Scene, parameter: Parameter, by: float) -> None:
-    """Change all values of a parameter in the tables of a scene."""
-    if dropper := _OF_DROPPER.fullmatch(parameter.key):
-        span, number = map(int, dropper.groups())
-        _lengthen(raw, span, number, parameter.values[0] + by)
-        return
-    if support := _OF_SUPPORT.fullmatch(parameter.key):
-        _lift(raw, scene, int(support[1]), by)
-        return
-    above, _, last = parameter.key.rpartition(".")
-    holder = value_at(raw, above)
-    place = int(last) if isinstance(holder, list) else last
-    if place == _FORCE and holder.get(_BY_SPEED):
-        holder[_BY_SPEED] = [[speed, force + by] for speed, force in holder[_BY_SPEED]]
-    elif isinstance(holder[place], list):
-        holder[place] = (np.array(holder[place]) + by).tolist()
-    else:
-        holder[place] += by
-
-
-def _lengthen(raw: dict[str, Any], span: int, number: int, error: float) -> None:
-    """Give a dropper an error of its length [mm]."""
-    lengths = raw.setdefault("irregularities", {}).setdefault("dropper_lengths", {})
-    others = [own for own in lengths.get("by_dropper", []) if own[:2] != [span, number]]
-    lengths["by_dropper"] = [*others, [span, number, error]]
-    raw["effects"]["dropper_lengths"] = True
+def _changed(raw: dict[str, Any], scene: Scene, parameter: Parameter, by: float) -> tuple[str, Any]:
+    """Key of the tables of a scene under which a parameter stands, and its value changed."""
+    key = parameter.key
+    above, _, last = key.rpartition(".")
+    if dropper := _OF_DROPPER.fullmatch(key):
+        place, key = [*map(int, dropper.groups())], f"{_LENGTHS}.by_dropper"
+        others = [own for own in value_at(raw, key) or [] if own[:2] != place]
+        return key, [*others, [*place, parameter.values[0] + by]]
+    if support := _OF_SUPPORT.fullmatch(key):
+        heights = copy.deepcopy(_heights_at_supports(raw, scene))
+        assert heights is not None
+        heights[int(support[1])][1] += length_from_mm(by)
+        return f"{_HEIGHTS}.by_place", heights
+    if last == _FORCE and (forces := value_at(raw, f"{above}.{_BY_SPEED}")):
+        return f"{above}.{_BY_SPEED}", [[speed, force + by] for speed, force in forces]
+    value = value_at(raw, key)
+    return key, (np.array(value) + by).tolist() if isinstance(value, list) else value + by
 
 
 def _heights_at_supports(raw: dict[str, Any], scene: Scene) -> list[list[float]] | None:
@@ -401,15 +402,6 @@ def _heights_at_supports(raw: dict[str, Any], scene: Scene) -> list[list[float]]
     places = line_of(scene).support_positions.tolist()
     given = value_at(raw, f"{_HEIGHTS}.by_place") or [[x, 0.0] for x in places]
     return given if [x for x, _ in given] == places else None
-
-
-def _lift(raw: dict[str, Any], scene: Scene, support: int, by: float) -> None:
-    """Change the height of the contact wire at a support [mm]."""
-    heights = copy.deepcopy(_heights_at_supports(raw, scene))
-    assert heights is not None
-    heights[support][1] += length_from_mm(by)
-    raw.setdefault("irregularities", {}).setdefault("contact_wire_height", {})["by_place"] = heights
-    raw["effects"]["contact_wire_height"] = True
 
 
 def _numbers(raw: Any, prefix: str = "") -> Iterator[str]:

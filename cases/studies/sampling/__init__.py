@@ -1,1 +1,0 @@
-"""Samples of a case with uncertain keys: distributions, correlations, and fields along the line."""

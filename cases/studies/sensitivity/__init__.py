@@ -1,1 +1,0 @@
-"""Sensitivities of a case: what its statistics change by with each of its parameters."""
