@@ -5,17 +5,22 @@ Backends are imported inside the verbs, so that --help stays quick.
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import os
+import re
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import typer
+from typer.models import ArgumentInfo
 
 import catenary
 from catenary.base.errors import InputError
+from catenary.base.options import Flag
 from catenary.base.parallel import (
     abort_on_unforeseen_error,
     launched_by_mpirun,
@@ -40,6 +45,8 @@ if TYPE_CHECKING:
     Command = Callable[..., int | None]
 
 T = TypeVar("T")
+# A line of a docstring, ``name : help`` or ``name METAVAR : help``, with those that go on.
+_PARAMETER = re.compile(r"^(\w+)(?: (?!:)(.+?))? : (.+(?:\n +.+)*)", re.MULTILINE)
 
 app: typer.Typer = typer.Typer(
     name="catenary",
@@ -64,131 +71,114 @@ def narrowed(application: typer.Typer, words: Sequence[str]) -> typer.Typer:
     return application
 
 
-def verb(name: str, *, help: str, epilog: str, serial: bool = False) -> Callable[[Command], Any]:
-    """Adds a function as a verb, see ``console.guarded``; a serial one runs on rank 0 alone."""
+def verb(name: str, *, serial: bool = False) -> Callable[[Command], Any]:
+    """Adds a function as a verb, see ``console.guarded``; a serial one runs on rank 0 alone.
+
+    Its docstring is the help: sentences, then an example, then for each parameter ``name : help``
+    or ``name METAVAR : help``. A parameter is an option if it has a default, with the name of the
+    parameter; ``Annotated`` says what is not so. One that is a dataclass stands for its fields.
+    """
 
     def added(function: Command) -> Any:
-        guarded = console.guarded(console.serial(function) if serial else function)
-        return app.command(name, cls=Verb, help=help, epilog=epilog)(guarded)
+        paragraphs, about = _documented(function)
+        about["quiet"] = None, "Print nothing but errors."
+        groups: dict[str, tuple[Any, dict[str, str]]] = {}
+        parameters = []
+        for one in inspect.signature(function, eval_str=True).parameters.values():
+            if not dataclasses.is_dataclass(one.annotation):
+                parameters.append(_parameter(one.name, one.annotation, one.default, about))
+                continue
+            own = _fields_of(one.name, one.annotation)
+            groups[one.name] = one.annotation, {field: own[field].name for field in own}
+            parameters += own.values()
+        quiet = Annotated[bool, typer.Option("-q", "--quiet")]
+        parameters.append(_parameter("quiet", quiet, False, about))
+        parameters.sort(key=_takes_the_rest)
+        if about:
+            raise ValueError(f"{name} has no parameter {', '.join(about)}")
+        run = console.serial(function) if serial else function
+
+        def gathered(**words: Any) -> int | None:
+            for group, (make, fields) in groups.items():
+                words[group] = make(**{field: words.pop(own) for field, own in fields.items()})
+            return run(**words)
+
+        command: Any = console.guarded(gathered)
+        # The command line is made from signature and annotations.
+        command.__signature__ = inspect.Signature(parameters)
+        command.__annotations__ = {one.name: one.annotation for one in parameters}
+        example = paragraphs.pop() if paragraphs[-1].startswith("Example: ") else None
+        app.command(name, cls=Verb, help=" ".join(paragraphs), epilog=example)(command)
+        return function
 
     return added
 
 
 serial_verb = partial(verb, serial=True)
+
+
+def _documented(own: Any) -> tuple[list[str], dict[str, tuple[str | None, str]]]:
+    """Paragraphs of a docstring; metavar and help of its parameters by their names."""
+    text, _, section = inspect.cleandoc(own.__doc__ or "").partition("\n\nParameters\n----------\n")
+    about = {
+        name: (metavar or None, " ".join(help.split()))
+        for name, metavar, help in _PARAMETER.findall(section)
+    }
+    return [" ".join(paragraph.split()) for paragraph in text.split("\n\n")], about
+
+
+def _parameter(
+    name: str, hint: Any, default: Any, about: dict[str, tuple[str | None, str]]
+) -> inspect.Parameter:
+    """A parameter of a command, with its help out of ``about``, where that has more to say."""
+    kind, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    flag = "--" + name.strip("_").replace("_", "-")
+    if marks and isinstance(marks[0], Flag):
+        mark: Any = typer.Option(marks[0].name, help=marks[0].help, metavar=marks[0].metavar)
+    elif marks:
+        mark = copy(marks[0])
+    elif default is inspect.Parameter.empty:
+        mark = typer.Argument()
+    else:  # Typer makes a pair of a truth: --state and --no-state
+        mark = typer.Option() if default is True else typer.Option(flag)
+    metavar, mark.help = about.pop(name, (None, mark.help))
+    mark.metavar = metavar or mark.metavar
+    own = Annotated[kind, mark]  # type: ignore[valid-type]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=own)
+
+
+def _fields_of(name: str, group: Any) -> dict[str, inspect.Parameter]:
+    """The fields of a dataclass as parameters; a ``Flag`` is an option of the group's own."""
+    about: dict[str, tuple[str | None, str]] = {}
+    for own in reversed(group.__mro__):
+        about |= _documented(own)[1]
+    found = {}
+    for field, hint in get_type_hints(group, include_extras=True).items():
+        is_own = any(isinstance(mark, Flag) for mark in getattr(hint, "__metadata__", ()))
+        default = getattr(group, field, inspect.Parameter.empty)
+        found[field] = _parameter(field, hint, default, about)
+        if is_own:
+            found[field] = found[field].replace(name=f"{name}_{field}")
+    return found
+
+
+def _takes_the_rest(one: inspect.Parameter) -> bool:
+    """Whether a parameter stands for all further arguments, so that it comes behind the others."""
+    kind, mark = get_args(one.annotation)
+    return isinstance(mark, ArgumentInfo) and any(
+        get_origin(own) is list for own in (kind, *get_args(kind))
+    )
+
+
 RunFolder = Annotated[
     Path,
     typer.Argument(parser=run_folder, metavar="FOLDER", help="Folder of a run, or its run.h5."),
 ]
-Case = Annotated[
-    str,
-    typer.Argument(
-        help="Name of a shipped case, or a case.toml, or a folder with one.",
-        autocompletion=command_words.cases,
-    ),
-]
-Assignments = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Replace a key of the scene, KEY= takes it away; repeatable.",
-        autocompletion=command_words.assignments,
-    ),
-]
-
-
-def folder_option(what: str) -> Any:
-    """The option ``-o FOLDER`` with its line of help."""
-    return typer.Option("-o", "--out", parser=console.folder, metavar="<path>", help=what)
-
-
-Out = Annotated[Path, folder_option("Folder for the results.")]
-MoreAssignments = Annotated[
-    list[str] | None,
-    typer.Argument(
-        metavar="KEY=VALUE",
-        help="Further assignments after --set.",
-        autocompletion=command_words.assignments,
-    ),
-]
-Shortened = Annotated[
-    bool, typer.Option("--short", help="Apply the case's [test] table, which shortens it.")
-]
+_folder = typer.Option("-o", "--out", parser=console.folder, metavar="<path>")
+_folder.help = "Folder for the results."
+Out = Annotated[Path, _folder]
+OutIfAny = Annotated[Path | None, _folder]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]
-
-
-PetscOptions = Annotated[
-    list[str] | None,
-    typer.Argument(metavar="-- PETSC_OPTION", help="Options for PETSc, after --."),
-]
-MoreAndPetscOptions = Annotated[
-    list[str] | None,
-    typer.Argument(
-        metavar="KEY=VALUE -- PETSC_OPTION",
-        help="Further assignments after --set, and after -- options for PETSc.",
-        autocompletion=command_words.assignments,
-    ),
-]
-
-
-@dataclass
-class SceneWords:
-    """The scene of a verb: a case, and how it is changed.
-
-    Attributes
-    ----------
-    case : name, file or folder
-    extras, assignments : ``key=value`` each, those of ``--set`` first
-    shortened : whether the case's ``[test]`` table is applied
-    """
-
-    case: Case
-    extras: MoreAssignments = None
-    assignments: Assignments = None
-    shortened: Shortened = False
-
-    def split(self) -> tuple[list[str], list[str]]:
-        """All assignments, and options for PETSc."""
-        from catenary.cases.process.petsc_options import split_extras
-
-        more, options = split_extras(self.extras or [])
-        return [*(self.assignments or []), *more], options
-
-    @property
-    def changes(self) -> list[str]:
-        """All assignments of a verb that takes no options for PETSc."""
-        changes, options = self.split()
-        if options:
-            raise InputError(f"{options[0]} after -- is an option for PETSc; this verb takes none")
-        return changes
-
-    def draft(self) -> tuple[Draft, list[str]]:
-        """The case with its assignments, not checked, and options for PETSc. Not collective."""
-        from catenary.cases.scene.load import read_draft
-
-        changes, options = self.split()
-        return read_draft(self.case, changes, self.shortened), options
-
-    def scene(self, *further: str) -> catenary.Scene:
-        """The scene, with further assignments, as Python programs have it. Not collective."""
-        from catenary.cases.scene.load import read_draft
-
-        return catenary.Scene(read_draft(self.case, [*self.changes, *further], self.shortened))
-
-    def load(self, *further: str) -> Scene:
-        """The tables of that scene. Not collective."""
-        from catenary.scenes import checked
-
-        return checked(self.scene(*further))
-
-
-@dataclass
-class RunWords(SceneWords):
-    """The scene of a verb that runs it, and options for PETSc."""
-
-    extras: MoreAndPetscOptions = None
-
-
 Strict = Annotated[
     bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
 ]
@@ -239,15 +229,75 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print the time o
 
 
 @dataclass
-class StudyRuns:
-    """Options for the runs of a study.
+class SceneWords:
+    """The scene of a verb: a case, and how it is changed.
 
-    Attributes
+    Parameters
     ----------
-    n_jobs : runs at the same time, 0 for one on each core
-    force : whether existing results are overwritten
-    verbose : whether the time of each phase is printed
+    case : Name of a shipped case, or a case.toml, or a folder with one.
+    extras KEY=VALUE : Further assignments after --set.
+    assignments KEY=VALUE : Replace a key of the scene, KEY= takes it away; repeatable.
+    shortened : Apply the case's [test] table, which shortens it.
     """
+
+    case: Annotated[str, typer.Argument(autocompletion=command_words.cases)]
+    extras: Annotated[
+        list[str] | None, typer.Argument(autocompletion=command_words.assignments)
+    ] = None
+    assignments: Annotated[
+        list[str] | None, typer.Option("--set", autocompletion=command_words.assignments)
+    ] = None
+    shortened: Annotated[bool, typer.Option("--short")] = False
+
+    def split(self) -> tuple[list[str], list[str]]:
+        """All assignments, and options for PETSc."""
+        from catenary.cases.process.petsc_options import split_extras
+
+        more, options = split_extras(self.extras or [])
+        return [*(self.assignments or []), *more], options
+
+    @property
+    def changes(self) -> list[str]:
+        """All assignments of a verb that takes no options for PETSc."""
+        changes, options = self.split()
+        if options:
+            raise InputError(f"{options[0]} after -- is an option for PETSc; this verb takes none")
+        return changes
+
+    def draft(self) -> tuple[Draft, list[str]]:
+        """The case with its assignments, not checked, and options for PETSc. Not collective."""
+        from catenary.cases.scene.load import read_draft
+
+        changes, options = self.split()
+        return read_draft(self.case, changes, self.shortened), options
+
+    def scene(self, *further: str) -> catenary.Scene:
+        """The scene, with further assignments, as Python programs have it. Not collective."""
+        from catenary.cases.scene.load import read_draft
+
+        return catenary.Scene(read_draft(self.case, [*self.changes, *further], self.shortened))
+
+    def load(self, *further: str) -> Scene:
+        """The tables of that scene. Not collective."""
+        from catenary.scenes import checked
+
+        return checked(self.scene(*further))
+
+
+@dataclass
+class RunWords(SceneWords):
+    """The scene of a verb that runs it, and options for PETSc.
+
+    Parameters
+    ----------
+    extras KEY=VALUE -- PETSC_OPTION : Further assignments after --set, and after -- options for
+        PETSc.
+    """
+
+
+@dataclass
+class StudyRuns:
+    """Options for the runs of a study."""
 
     n_jobs: Jobs = 1
     force: Force = False

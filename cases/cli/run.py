@@ -15,7 +15,6 @@ from catenary.cases.cli.app import (
     NoReport,
     Out,
     PartOfRuns,
-    PetscOptions,
     RunFolder,
     RunWords,
     Strict,
@@ -38,25 +37,26 @@ if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
 
 
-@verb(
-    "run",
-    help="Simulate a case and write its results into a folder.",
-    epilog="Example: catenary run en50318_2002 -o results/en300 --set train.speed_km_h=300 "
-    "-- -log_view; catenary run ambrosio2012 --study -o results/study",
-)
+@verb("run")
 def run(
     words: RunWords,
     out: Out,
     strict: Strict = False,
     no_report: NoReport = False,
-    study: Annotated[
-        bool, typer.Option("--study", help="Run the case's study: variants, figures, verdicts.")
-    ] = False,
+    study: bool = False,
     part: PartOfRuns = None,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Simulate a case and write its results into a folder.
+
+    Example: catenary run en50318_2002 -o results/en300 --set train.speed_km_h=300 -- -log_view;
+    catenary run ambrosio2012 --study -o results/study
+
+    Parameters
+    ----------
+    study : Run the case's study: variants, figures, verdicts.
+    """
     from catenary.cases.scene.load import load_scene
 
     if study:
@@ -101,32 +101,32 @@ def run(
     return _end(made, strict)
 
 
-@verb(
-    "restart",
-    help="Continue an interrupted run, or prolong a finished one. It goes on from the last state "
-    "in the result file of a run that was interrupted, broke or is done.",
-    epilog="Example: catenary restart results/en300; catenary restart results/en300 --until-m 900 "
-    "--evaluate 600:840",
-)
+@verb("restart")
 def restart(
     folder: RunFolder,
-    extras: PetscOptions = None,
-    until_m: Annotated[
-        float | None,
-        typer.Option("--until-m", help="Go on until the leading pantograph is there."),
-    ] = None,
-    evaluate: Annotated[
-        str | None,
-        typer.Option(metavar="FROM:TO", help="With --until-m: the stretch to evaluate [m]."),
-    ] = None,
+    extras: Annotated[list[str] | None, typer.Argument()] = None,
+    until_m: float | None = None,
+    evaluate: str | None = None,
     strict: Strict = False,
     no_report: NoReport = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Continue even without room for all results.")
-    ] = False,
+    force: bool = False,
     verbose: Verbose = False,
 ) -> int:
-    """Collective."""
+    """Continue an interrupted run, or prolong a finished one.
+
+    It goes on from the last state in the result file of a run that was interrupted, broke or is
+    done.
+
+    Example: catenary restart results/en300; catenary restart results/en300 --until-m 900 --evaluate
+    600:840
+
+    Parameters
+    ----------
+    extras -- PETSC_OPTION : Options for PETSc, after --.
+    until_m : Go on until the leading pantograph is there.
+    evaluate FROM:TO : With --until-m: the stretch to evaluate [m].
+    force : Continue even without room for all results.
+    """
     from catenary.cases.process.petsc_options import split_extras
 
     def read() -> tuple[Scene, list[str]]:
@@ -182,66 +182,42 @@ def _end(made: catenary.Run, strict: bool) -> int:
     return console.NOT_ACCEPTED if strict and made.passed is False else console.DONE
 
 
-@serial_verb(
-    "submit",
-    help="Hand a run to SLURM, with time and memory from the plan. Jobs that wait continue it "
-    "where a limit of time or a lost node ends one. With --array a sweep or study: a job "
-    "array whose tasks make the runs, and a job that makes the table.",
-    epilog="Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh; "
-    "catenary submit en50318_2002 -o results/speeds --array 10 --vary train.speed_km_h=200,250,300",
-)
+@serial_verb("submit")
 def submit(
     words: RunWords,
     out: Out,
-    ranks: Annotated[
-        int,
-        typer.Option(
-            "--ranks",
-            min=1,
-            max=10**6,
-            help="MPI ranks; with --array those of each task, one run on each.",
-        ),
-    ] = 1,
-    nodes: Annotated[
-        int, typer.Option("--nodes", min=1, max=10**5, help="Number of cluster nodes.")
-    ] = 1,
-    minutes: Annotated[
-        int | None,
-        typer.Option(
-            "--minutes", min=5, max=10**5, help="Limit of a job; from the plan if absent."
-        ),
-    ] = None,
-    chain: Annotated[
-        int,
-        typer.Option(
-            "--chain",
-            min=0,
-            max=1000,
-            help="Jobs that may follow the first, or how often a task may be started again.",
-        ),
-    ] = 9,
-    array: Annotated[
-        int | None,
-        typer.Option("--array", metavar="N", min=1, max=10**5, help="Tasks of a sweep or study."),
-    ] = None,
+    ranks: Annotated[int, typer.Option(min=1, max=10**6)] = 1,
+    nodes: Annotated[int, typer.Option(min=1, max=10**5)] = 1,
+    minutes: Annotated[int | None, typer.Option(min=5, max=10**5)] = None,
+    chain: Annotated[int, typer.Option(min=0, max=1000)] = 9,
+    array: Annotated[int | None, typer.Option(min=1, max=10**5)] = None,
     vary: Vary = None,
     named: NamedVariants = None,
-    study: Annotated[
-        bool, typer.Option("--study", help="With --array: the case's study, not a sweep.")
-    ] = False,
-    directives: Annotated[
-        list[str] | None,
-        typer.Option("--sbatch", metavar="OPTION", help="Option of sbatch; repeatable."),
-    ] = None,
-    before: Annotated[
-        list[str] | None,
-        typer.Option("--before", metavar="LINE", help="Line of shell before the run; repeatable."),
-    ] = None,
-    only_print: Annotated[
-        bool, typer.Option("--print", help="Print the script and submit nothing.")
-    ] = False,
+    study: bool = False,
+    sbatch: list[str] | None = None,
+    before: list[str] | None = None,
+    print_: bool = False,
 ) -> None:
-    """Serial."""
+    """Hand a run to SLURM, with time and memory from the plan.
+
+    Jobs that wait continue it where a limit of time or a lost node ends one. With --array a sweep
+    or study: a job array whose tasks make the runs, and a job that makes the table.
+
+    Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh; catenary
+    submit en50318_2002 -o results/speeds --array 10 --vary train.speed_km_h=200,250,300
+
+    Parameters
+    ----------
+    ranks : MPI ranks; with --array those of each task, one run on each.
+    nodes : Number of cluster nodes.
+    minutes : Limit of a job; from the plan if absent.
+    chain : Jobs that may follow the first, or how often a task may be started again.
+    array N : Tasks of a sweep or study.
+    study : With --array: the case's study, not a sweep.
+    sbatch OPTION : Option of sbatch; repeatable.
+    before LINE : Line of shell before the run; repeatable.
+    print_ : Print the script and submit nothing.
+    """
     import shutil
 
     from catenary.cases.run.cluster import SlurmJob, slurm_script
@@ -257,9 +233,7 @@ def submit(
     case_words += ["--short"] if words.shortened else []
     # The folder comes last, so that nothing is taken for a further assignment.
     case_words += [word for value in chosen for word in ("--set", value)]
-    job = SlurmJob(
-        ranks, nodes, minutes, chain, directives or [], before or [], "B:" if array else ""
-    )
+    job = SlurmJob(ranks, nodes, minutes, chain, sbatch or [], before or [], "B:" if array else "")
     if array is None:
         from catenary.cases.run.continuing import refuse_other_scene
         from catenary.cases.scene.load import load_scene
@@ -269,7 +243,7 @@ def submit(
         script = slurm_script(case_words, out, job, *_needs_on(scene, job), options)
     else:
         script = _array_script(words, case_words, out, job, array, vary, named, study)
-    if only_print:
+    if print_:
         console.print_as_is(script)
         return
     if shutil.which("sbatch") is None:

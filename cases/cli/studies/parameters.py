@@ -11,8 +11,8 @@ from catenary.cases.cli import command_words
 from catenary.cases.cli.app import (
     Force,
     Out,
+    OutIfAny,
     SceneWords,
-    folder_option,
     leave,
     serial_verb,
 )
@@ -21,38 +21,28 @@ from catenary.cases.studies.asked import Frequencies
 from catenary.cases.terminal import console
 
 
-@serial_verb(
-    "pantograph",
-    help="Print the frequency response of a case's pantograph. Also its static force, equivalent "
-    "masses, natural frequencies, and a lumped model fitted to it; with -o they are written "
-    "as files.",
-    epilog="Example: catenary pantograph ambrosio2012 --fit 2 -o results/pantograph",
-)
+@serial_verb("pantograph")
 def pantograph(
     words: SceneWords,
     over: Frequencies,
-    kind: Annotated[
-        str | None,
-        typer.Option(
-            "--kind",
-            metavar="NAME",
-            help="Table of [pantographs]; that of the leading pantograph if absent.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None, folder_option("Folder for receptance.csv, receptance.png and lumped.toml.")
-    ] = None,
-    masses: Annotated[
-        int | None,
-        typer.Option(
-            "--fit",
-            metavar="N",
-            help="Masses of the lumped model, 1 to 3; if absent two, or a lumped pantograph's own.",
-        ),
-    ] = None,
+    kind: str | None = None,
+    out: OutIfAny = None,
+    fit: int | None = None,
     force: Force = False,
 ) -> None:
-    """Serial."""
+    """Print the frequency response of a case's pantograph.
+
+    Also its static force, equivalent masses, natural frequencies, and a lumped model fitted to it;
+    with -o they are written as files.
+
+    Example: catenary pantograph ambrosio2012 --fit 2 -o results/pantograph
+
+    Parameters
+    ----------
+    kind NAME : Table of [pantographs]; that of the leading pantograph if absent.
+    out : Folder for receptance.csv, receptance.png and lumped.toml.
+    fit N : Masses of the lumped model, 1 to 3; if absent two, or a lumped pantograph's own.
+    """
     from catenary.cases.studies.pantograph_response import (
         FILES,
         files_of,
@@ -64,55 +54,38 @@ def pantograph(
     if out is not None:
         for name in FILES:
             refuse_table(out / name, force)
-    found = study(words.load(), kind, masses, over)
+    found = study(words.load(), kind, fit, over)
     leave(out, study_text(found), lambda: files_of(found))
 
 
-@serial_verb(
-    "sensitivity",
-    help="Rank what the parameters of a case change. It prints the derivatives of the contact-"
-    "force statistics and the largest uplift, from one march: what a millimetre, a "
-    "kilonewton of tension, a kilogram or a per cent changes.",
-    epilog="Example: catenary sensitivity en50318_2002 -p line.contact_wire.tension_N "
-    "-p pantographs.reference.masses_kg.0",
-)
+@serial_verb("sensitivity")
 def sensitivity(
     words: SceneWords,
     keys: Annotated[
-        list[str] | None,
-        typer.Option(
-            "-p",
-            "--parameter",
-            metavar="KEY",
-            autocompletion=command_words.keys,
-            help="Key of a number, or of a list whose entries change together, with .0, .1 ... "
-            "for one of its entries; repeatable. Those of pantographs, contact, wires, droppers "
-            "and damping if absent.",
-        ),
+        list[str] | None, typer.Option("-p", "--parameter", autocompletion=command_words.keys)
     ] = None,
-    droppers: Annotated[
-        bool,
-        typer.Option(
-            "--droppers",
-            help="The length of each dropper in the evaluated stretch, besides what -p names.",
-        ),
-    ] = False,
-    at_rest: Annotated[
-        bool,
-        typer.Option(
-            "--at-rest",
-            help="Shape and elasticity of the span in the middle of the line, without a march.",
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None,
-        folder_option(
-            "Folder for sensitivity.csv, or sensitivity_at_rest.csv; without it nothing is written."
-        ),
-    ] = None,
+    droppers: bool = False,
+    at_rest: bool = False,
+    out: OutIfAny = None,
     force: Force = False,
 ) -> int:
-    """Serial."""
+    """Rank what the parameters of a case change.
+
+    It prints the derivatives of the contact-force statistics and the largest uplift, from one
+    march: what a millimetre, a kilonewton of tension, a kilogram or a per cent changes.
+
+    Example: catenary sensitivity en50318_2002 -p line.contact_wire.tension_N -p
+    pantographs.reference.masses_kg.0
+
+    Parameters
+    ----------
+    keys KEY : Key of a number, or of a list whose entries change together, with .0, .1 ... for one
+        of its entries; repeatable. Those of pantographs, contact, wires, droppers and damping if
+        absent.
+    droppers : The length of each dropper in the evaluated stretch, besides what -p names.
+    at_rest : Shape and elasticity of the span in the middle of the line, without a march.
+    out : Folder for sensitivity.csv, or sensitivity_at_rest.csv; without it nothing is written.
+    """
     from catenary.parameters import AT_REST, SENSITIVITIES, derivatives, rest_derivatives
 
     scene = words.scene()
@@ -126,30 +99,28 @@ def sensitivity(
     return console.DONE
 
 
-@serial_verb(
-    "identify",
-    help="Find parameters of a case from a measured passage. Errors of dropper lengths, tensions, "
-    "damping, masses and others follow from a measured contact force or head height: most "
-    "probable values, their uncertainty, what the data cannot determine, and whether the "
-    "model fits.",
-    epilog="Example: catenary identify ac_simple measured.csv task.toml -o results/identified",
-)
+@serial_verb("identify")
 def identify(
     words: SceneWords,
-    measured: Annotated[
-        Path, typer.Argument(help="CSV file of a passage: places or times, forces, head heights.")
-    ],
-    task: Annotated[
-        Path,
-        typer.Argument(
-            help="TOML file: columns, units and noise of the measurement, parameters that are "
-            "looked for and their priors."
-        ),
-    ],
+    measured: Path,
+    task: Path,
     out: Out,
     force: Force = False,
 ) -> int:
-    """Serial."""
+    """Find parameters of a case from a measured passage.
+
+    Errors of dropper lengths, tensions, damping, masses and others follow from a measured contact
+    force or head height: most probable values, their uncertainty, what the data cannot determine,
+    and whether the model fits.
+
+    Example: catenary identify ac_simple measured.csv task.toml -o results/identified
+
+    Parameters
+    ----------
+    measured : CSV file of a passage: places or times, forces, head heights.
+    task : TOML file: columns, units and noise of the measurement, parameters that are looked for
+        and their priors.
+    """
     from catenary.parameters import identified, identified_files, task_of
 
     wanted = task_of(task)

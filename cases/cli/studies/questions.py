@@ -11,10 +11,10 @@ import typer
 
 from catenary.base.parallel import on_root
 from catenary.cases.cli.app import (
+    OutIfAny,
     RunFolder,
     RunWords,
     StudyRuns,
-    folder_option,
     leave,
     print_findings,
     records_of,
@@ -57,37 +57,30 @@ class Direction(StrEnum):
     BACKWARD = "backward"
 
 
-@verb(
-    "speed",
-    help="Find the highest speed at which the criteria hold. They hold if they do in both "
-    "directions, all together and each by itself: an ensemble over speeds, then bisection. The "
-    "same command continues one that was stopped.",
-    epilog="Example: catenary speed en50318_2002 -o results/highest --from 200 --to 360",
-)
+@verb("speed")
 def speed(
     words: RunWords,
     speeds: Speeds,
-    criterion: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Part of the name of a criterion, such as deviation; repeatable. All if absent."
-        ),
-    ] = None,
-    direction: Annotated[
-        Direction | None,
-        typer.Option(
-            help="The one direction of the train to judge; both if absent, where the line can be "
-            "turned."
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        folder_option("Folder for tables and picture; without it nothing is written."),
-    ] = None,
+    criterion: list[str] | None = None,
+    direction: Direction | None = None,
+    out: OutIfAny = None,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Find the highest speed at which the criteria hold.
+
+    They hold if they do in both directions, all together and each by itself: an ensemble over
+    speeds, then bisection. The same command continues one that was stopped.
+
+    Example: catenary speed en50318_2002 -o results/highest --from 200 --to 360
+
+    Parameters
+    ----------
+    criterion : Part of the name of a criterion, such as deviation; repeatable. All if absent.
+    direction : The one direction of the train to judge; both if absent, where the line can be
+        turned.
+    out : Folder for tables and picture; without it nothing is written.
+    """
     from catenary.questions import find_speeds
 
     speeds.first()
@@ -97,25 +90,25 @@ def speed(
     return console.DONE
 
 
-@verb(
-    "separation",
-    help="Find good and bad distances of two pantographs. It prints deviation, least force and "
-    "uplift over the distance, where acceptance criteria fail, and which waves explain it. "
-    "The same command continues one that was stopped.",
-    epilog="Example: catenary separation en50318_2002 -o results/distances --from 50 --to 200 "
-    "--step 5",
-)
+@verb("separation")
 def separation(
     words: RunWords,
     distances: Distances,
-    out: Annotated[
-        Path | None,
-        folder_option("Folder for table and picture; without it nothing is written."),
-    ] = None,
+    out: OutIfAny = None,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Find good and bad distances of two pantographs.
+
+    It prints deviation, least force and uplift over the distance, where acceptance criteria fail,
+    and which waves explain it. The same command continues one that was stopped.
+
+    Example: catenary separation en50318_2002 -o results/distances --from 50 --to 200 --step 5
+
+    Parameters
+    ----------
+    out : Folder for table and picture; without it nothing is written.
+    """
     from catenary.questions import find_separations
 
     distances.values()
@@ -125,24 +118,25 @@ def separation(
     return console.DONE
 
 
-@verb(
-    "what-if",
-    help="Run a case with and without changes, and compare them. The changes are those of --set; "
-    "compared are statistics, uplift by support, droppers, verdicts. The same command "
-    "continues runs that were stopped.",
-    epilog="Example: catenary what-if en50318_2002 --set line.contact_wire.tension_N=22000 "
-    "-o results/tension",
-)
+@verb("what-if")
 def what_if(
     words: RunWords,
-    out: Annotated[
-        Path | None,
-        folder_option("Folder for page, tables, pictures and both runs; none is kept if absent."),
-    ] = None,
+    out: OutIfAny = None,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Run a case with and without changes, and compare them.
+
+    The changes are those of --set; compared are statistics, uplift by support, droppers, verdicts.
+    The same command continues runs that were stopped.
+
+    Example: catenary what-if en50318_2002 --set line.contact_wire.tension_N=22000 -o
+    results/tension
+
+    Parameters
+    ----------
+    out : Folder for page, tables, pictures and both runs; none is kept if absent.
+    """
     from catenary.callers import temporary_folder
     from catenary.cases.studies.questions import what_if as question
 
@@ -166,23 +160,23 @@ def what_if(
     return console.DONE
 
 
-@serial_verb(
-    "worst",
-    help="Name the worst spans, supports and droppers of a run. Each has possible causes: "
-    "defects, elasticity, reflections, ends of wires, the pantograph ahead.",
-    epilog="Example: catenary worst results/en300",
-)
+@serial_verb("worst")
 def worst(
     folder: RunFolder,
-    count: Annotated[
-        int, typer.Option("-n", "--count", min=1, max=1000, help="Places of each kind.")
-    ] = 3,
-    out: Annotated[
-        Path | None,
-        folder_option("Folder for tables of all places; without it nothing is written."),
-    ] = None,
+    count: Annotated[int, typer.Option("-n", "--count", min=1, max=1000)] = 3,
+    out: OutIfAny = None,
 ) -> None:
-    """Serial."""
+    """Name the worst spans, supports and droppers of a run.
+
+    Each has possible causes: defects, elasticity, reflections, ends of wires, the pantograph ahead.
+
+    Example: catenary worst results/en300
+
+    Parameters
+    ----------
+    count : Places of each kind.
+    out : Folder for tables of all places; without it nothing is written.
+    """
     records = records_of(folder)
     if out is not None:
         refuse_impossible(out)

@@ -20,12 +20,12 @@ from catenary.cases.cli.app import (
     Jobs,
     NamedVariants,
     Out,
+    OutIfAny,
     PartOfRuns,
     RunWords,
     SceneWords,
     StudyRuns,
     Vary,
-    folder_option,
     leave,
     names_in,
     print_findings,
@@ -48,80 +48,56 @@ if TYPE_CHECKING:
 _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 
 
-@verb(
-    "sweep",
-    help="Run variants of a case and tabulate their statistics. The same command continues a "
-    "sweep that was stopped.",
-    epilog="Example: catenary sweep en50318_2002 -o results/speeds --vary "
-    "train.speed_km_h=200,250,300 --vary contact.stiffness_N_per_m=2e4,5e4",
-)
+@verb("sweep")
 def sweep(
     words: RunWords,
     out: Out,
     vary: Vary = None,
     named: NamedVariants = None,
-    sample: Annotated[
-        Path | None,
-        typer.Option(
-            "--sample",
-            help="TOML file of distributions by keys, with n, seed and method: samples are run, "
-            "and their table evaluated.",
-        ),
-    ] = None,
-    plotted: Annotated[
-        str | None,
-        typer.Option(
-            "--plot",
-            metavar="STATISTIC,...",
-            help="Columns of sweep.csv to draw; mean_N,std_N,max_N,min_N,max_uplift_mm if absent.",
-        ),
-    ] = None,
-    reports: Annotated[
-        bool, typer.Option("--reports", help="Also write the report of each run.")
-    ] = False,
-    only_statistics: Annotated[
-        bool,
-        typer.Option(
-            "--only-statistics",
-            help="Write the table but no result files: for thousands of variants. "
-            "Variants that share a line march side by side.",
-        ),
-    ] = False,
-    histories: Annotated[
-        str | None,
-        typer.Option(
-            "--histories",
-            metavar="NAME,...",
-            help="With --only-statistics, also keep histories of all variants in one file, "
-            "histories.h5: contact_force, filtered_force, head_height, wire_height.",
-        ),
-    ] = None,
-    histogram: Annotated[
-        bool,
-        typer.Option(
-            "--histogram",
-            help="Also write force_histogram.csv, the share of time in bins of the filtered "
-            "contact force, and a picture of it.",
-        ),
-    ] = False,
+    sample: Path | None = None,
+    plot: str | None = None,
+    reports: bool = False,
+    only_statistics: bool = False,
+    histories: str | None = None,
+    histogram: bool = False,
     part: PartOfRuns = None,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Run variants of a case and tabulate their statistics.
+
+    The same command continues a sweep that was stopped.
+
+    Example: catenary sweep en50318_2002 -o results/speeds --vary train.speed_km_h=200,250,300
+    --vary contact.stiffness_N_per_m=2e4,5e4
+
+    Parameters
+    ----------
+    sample : TOML file of distributions by keys, with n, seed and method: samples are run, and their
+        table evaluated.
+    plot STATISTIC,... : Columns of sweep.csv to draw; mean_N,std_N,max_N,min_N,max_uplift_mm if
+        absent.
+    reports : Also write the report of each run.
+    only_statistics : Write the table but no result files: for thousands of variants. Variants that
+        share a line march side by side.
+    histories NAME,... : With --only-statistics, also keep histories of all variants in one file,
+        histories.h5: contact_force, filtered_force, head_height, wire_height.
+    histogram : Also write force_histogram.csv, the share of time in bins of the filtered contact
+        force, and a picture of it.
+    """
     from catenary.cases.studies.planned_sweep import plan_sweep
     from catenary.cases.studies.sweep.jobs import STATISTICS, check_names, parse_part
     from catenary.sweeps import samples_of
 
     own = None if part is None else parse_part(part)
-    if own is not None and (plotted is not None or histogram):
+    if own is not None and (plot is not None or histogram):
         raise InputError(
             "a part has no pictures: leave --plot and --histogram to the sweep after all parts"
         )
 
     def read() -> tuple[PlannedSweep, list[str]]:
         draft, options = words.draft()
-        check_names(names_in(plotted), STATISTICS, "statistic")
+        check_names(names_in(plot), STATISTICS, "statistic")
         sampling = None
         if sample is None:
             variants = read_variants(vary, named)
@@ -154,7 +130,7 @@ def sweep(
     if own is not None:
         return verdict(made.run_part(own, comm, options), "sweep")
     command = f"catenary sweep {words.case}"
-    found = made.run(comm, options, command, names_in(plotted), histogram)
+    found = made.run(comm, options, command, names_in(plot), histogram)
     print_findings(found.text, found.files)
     return verdict(found.ended, "sweep")
 
@@ -229,30 +205,25 @@ def verdict(ended: Sequence[Ended], what: str) -> int:
     return console.BROKEN
 
 
-@serial_verb(
-    "uncertainty",
-    help="Evaluate the table of a sweep with uncertain keys. It prints quantiles, probabilities "
-    "that acceptance criteria fail and sensitivity indices, all with 95 % bounds, and draws "
-    "pictures.",
-    epilog="Example: catenary uncertainty results/tolerances",
-)
+@serial_verb("uncertainty")
 def uncertainty(
-    table: Annotated[
-        Path,
-        typer.Argument(
-            help="Folder of a sweep, or a table like its sweep.csv, as .csv or .parquet."
-        ),
-    ],
-    sample: Annotated[
-        Path | None,
-        typer.Option("--sample", help="Sampling file of the table, if none is beside it."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        folder_option("Folder for uncertainty.json and pictures, the table's if absent."),
-    ] = None,
+    table: Path,
+    sample: Path | None = None,
+    out: OutIfAny = None,
 ) -> None:
-    """Serial."""
+    """Evaluate the table of a sweep with uncertain keys.
+
+    It prints quantiles, probabilities that acceptance criteria fail and sensitivity indices, all
+    with 95 % bounds, and draws pictures.
+
+    Example: catenary uncertainty results/tolerances
+
+    Parameters
+    ----------
+    table : Folder of a sweep, or a table like its sweep.csv, as .csv or .parquet.
+    sample : Sampling file of the table, if none is beside it.
+    out : Folder for uncertainty.json and pictures, the table's if absent.
+    """
     from catenary.sweeps import estimate_files
 
     if out is not None:
@@ -262,21 +233,24 @@ def uncertainty(
     leave(folder, str(found), lambda: estimate_files(found))
 
 
-@serial_verb(
-    "merge",
-    help="Join sweeps of one case that ran in several folders. Folders such as the parts of "
-    "--part become one table, with their histories if all have some; those that contradict each "
-    "other are refused.",
-    epilog="Example: catenary merge results/part_1 results/part_2 -o results/tolerances",
-)
+@serial_verb("merge")
 def merge(
-    folders: Annotated[
-        list[Path], typer.Argument(help="Folders of sweeps, at least two, or one with parts.")
-    ],
-    out: Annotated[Path, folder_option("Folder for the table.")],
+    folders: list[Path],
+    out: Out,
     force: Force = False,
 ) -> None:
-    """Serial."""
+    """Join sweeps of one case that ran in several folders.
+
+    Folders such as the parts of --part become one table, with their histories if all have some;
+    those that contradict each other are refused.
+
+    Example: catenary merge results/part_1 results/part_2 -o results/tolerances
+
+    Parameters
+    ----------
+    folders : Folders of sweeps, at least two, or one with parts.
+    out : Folder for the table.
+    """
     from catenary.cases.studies import merged_sweeps
     from catenary.cases.studies.sweep.sweep import RECORD
     from catenary.cases.studies.uncertainty import output
@@ -329,33 +303,32 @@ class TaskWords(SceneWords):
         return console.DONE
 
 
-@serial_verb(
-    "optimise",
-    help="Choose numbers of a scene for the calmest contact force. Droppers, tensions, "
-    "pantographs or any others are chosen for the smallest standard deviation of the contact "
-    "force, or another statistic, over both directions, several speeds, trains and "
-    "installation errors; the optimum is checked with a finer mesh, a shorter step and "
-    "unseen errors. The same command continues one that was stopped.",
-    epilog="Example: catenary optimise ac_simple droppers.toml -o results/optimum "
-    "--set train.speed_km_h=320",
-)
+@serial_verb("optimise")
 def optimise(words: TaskWords) -> int:
-    """Serial."""
+    """Choose numbers of a scene for the calmest contact force.
+
+    Droppers, tensions, pantographs or any others are chosen for the smallest standard deviation of
+    the contact force, or another statistic, over both directions, several speeds, trains and
+    installation errors; the optimum is checked with a finer mesh, a shorter step and unseen errors.
+    The same command continues one that was stopped.
+
+    Example: catenary optimise ac_simple droppers.toml -o results/optimum --set train.speed_km_h=320
+    """
     from catenary.optimising import optima
 
     return words.make("optimise", optima)
 
 
-@serial_verb(
-    "tolerance",
-    help="Find the tolerances within which the criteria hold. Droppers, heights, tensions or any "
-    "numbers of a scene may be off so far that each acceptance criterion holds with a "
-    "probability of 99 %, by samples of errors, and in the worst case. The same command "
-    "continues one that was stopped.",
-    epilog="Example: catenary tolerance en50318_2002 installation.toml -o results/tolerance",
-)
+@serial_verb("tolerance")
 def tolerance(words: TaskWords) -> int:
-    """Serial."""
+    """Find the tolerances within which the criteria hold.
+
+    Droppers, heights, tensions or any numbers of a scene may be off so far that each acceptance
+    criterion holds with a probability of 99 %, by samples of errors, and in the worst case. The
+    same command continues one that was stopped.
+
+    Example: catenary tolerance en50318_2002 installation.toml -o results/tolerance
+    """
     from catenary.optimising import tolerances
 
     return words.make("tolerance", tolerances)

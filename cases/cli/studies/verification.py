@@ -19,11 +19,11 @@ from catenary.cases.cli.app import (
     Force,
     Jobs,
     Out,
+    OutIfAny,
     RunWords,
     SceneWords,
     Strict,
     StudyRuns,
-    folder_option,
     leave,
     print_findings,
     serial_verb,
@@ -45,42 +45,32 @@ HARD, HARD_PAGE = "hard.csv", "hard.md"
 MAP, MAP_PICTURE = "stability_map.csv", "stability_map.png"
 
 
-@verb(
-    "accuracy",
-    help="Find the step and mesh that a wanted accuracy needs. Step, mesh, scheme, coupling and "
-    "models of a case are varied; the error and time of each setting are printed. The same "
-    "command continues one that was stopped.",
-    epilog="Example: catenary accuracy en50318_2002 -o results/accuracy --axes dt,grid --target 2%",
-)
+@verb("accuracy")
 def accuracy(
     words: RunWords,
     out: Out,
-    axes: Annotated[
-        str | None,
-        typer.Option(
-            "--axes",
-            metavar="NAME,...",
-            autocompletion=command_words.axes,
-            help="Out of dt, elements, grid, scheme, coupling, adaptive, contact, dropper, "
-            "pantograph, planes, lateral_damping, parts; all if absent.",
-        ),
-    ] = None,
-    target: Annotated[
-        str, typer.Option("--target", metavar="PERCENT", help="Wanted accuracy.")
-    ] = "1%",
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick", help="Few levels and a coarser reference, good for targets from 2%."
-        ),
-    ] = False,
-    repeats: Annotated[
-        int, typer.Option("--repeats", metavar="N", help="How often short runs are timed.")
-    ] = 3,
+    axes: Annotated[str | None, typer.Option(autocompletion=command_words.axes)] = None,
+    target: str = "1%",
+    quick: bool = False,
+    repeats: int = 3,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Find the step and mesh that a wanted accuracy needs.
+
+    Step, mesh, scheme, coupling and models of a case are varied; the error and time of each setting
+    are printed. The same command continues one that was stopped.
+
+    Example: catenary accuracy en50318_2002 -o results/accuracy --axes dt,grid --target 2%
+
+    Parameters
+    ----------
+    axes NAME,... : Out of dt, elements, grid, scheme, coupling, adaptive, contact, dropper,
+        pantograph, planes, lateral_damping, parts; all if absent.
+    target PERCENT : Wanted accuracy.
+    quick : Few levels and a coarser reference, good for targets from 2%.
+    repeats N : How often short runs are timed.
+    """
     from catenary.cases.studies.accuracy.analysis import parse_target
     from catenary.cases.studies.accuracy.axes import parse_axes
     from catenary.cases.studies.accuracy.runs import make_plan
@@ -111,30 +101,27 @@ def accuracy(
     return console.DONE
 
 
-@verb(
-    "hard",
-    help="Run the hard cases and print which limits they keep. Limits are energy, bounds, "
-    "refinement, schemes, and ranks under mpirun. Some five minutes; exits with 3 if a limit "
-    "is not kept. With -o the same command continues one that was stopped.",
-    epilog="Example: catenary hard -o results/hard",
-)
+@verb("hard")
 def hard(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="NAME", help="Only these hard cases; with * and ? all that fit: 'twin_*'."
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None, folder_option("Folder for the table as hard.csv and hard.md.")
-    ] = None,
-    shortened: Annotated[
-        bool, typer.Option("--short", help="Shorter runs, steps halved once only.")
-    ] = False,
+    names: Annotated[list[str] | None, typer.Argument()] = None,
+    out: OutIfAny = None,
+    shortened: Annotated[bool, typer.Option("--short")] = False,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Run the hard cases and print which limits they keep.
+
+    Limits are energy, bounds, refinement, schemes, and ranks under mpirun. Some five minutes; exits
+    with 3 if a limit is not kept. With -o the same command continues one that was stopped.
+
+    Example: catenary hard -o results/hard
+
+    Parameters
+    ----------
+    names NAME : Only these hard cases; with * and ? all that fit: 'twin_*'.
+    out : Folder for the table as hard.csv and hard.md.
+    shortened : Shorter runs, steps halved once only.
+    """
 
     def read() -> list[HardCase]:
         from catenary.cases.studies.hard.cases import hard_cases
@@ -188,22 +175,26 @@ def hard(
     return console.NOT_ACCEPTED if failed else console.DONE
 
 
-@serial_verb(
-    "stability-map",
-    help="Find the largest stable step of every coupling. It is found against contact stiffness "
-    "and head mass, from the matrices of a step and by marching, and drawn. Some three "
-    "minutes; exits with 3 if matrices and marches do not agree. The same command continues "
-    "one that was stopped.",
-    epilog="Example: catenary stability-map en50318_2002 -o results/stability",
-)
+@serial_verb("stability-map")
 def stability_map(
     words: SceneWords,
     out: Out,
-    quick: Annotated[bool, typer.Option("--quick", help="Few stiffnesses and masses.")] = False,
+    quick: bool = False,
     n_jobs: Jobs = 1,
     force: Force = False,
 ) -> int:
-    """Serial."""
+    """Find the largest stable step of every coupling.
+
+    It is found against contact stiffness and head mass, from the matrices of a step and by
+    marching, and drawn. Some three minutes; exits with 3 if matrices and marches do not agree. The
+    same command continues one that was stopped.
+
+    Example: catenary stability-map en50318_2002 -o results/stability
+
+    Parameters
+    ----------
+    quick : Few stiffnesses and masses.
+    """
     from catenary.cases.process.workers import at_once
     from catenary.cases.scene.load import read_draft
     from catenary.cases.studies.records import held_study
@@ -221,47 +212,41 @@ def stability_map(
     return console.DONE if all(one.agrees for one in found.limits) else console.NOT_ACCEPTED
 
 
-@verb(
-    "scaling",
-    help="Predict the time of a step on many ranks. It follows from latency and bandwidth of "
-    "messages: those between the ranks that it is started on, or given ones. On several "
-    "ranks it also times all messages of a step between them.",
-    epilog="Example: mpirun -n 8 --oversubscribe catenary scaling ambrosio2012 "
-    "--ranks 64,512,4096 --set line.n_spans=10000",
-)
+@verb("scaling")
 def scaling(
     words: SceneWords,
-    ranks: Annotated[
-        str, typer.Option("--ranks", metavar="N,...", help="Numbers of ranks.")
-    ] = "64,512,4096",
-    latency: Annotated[
-        float | None,
-        typer.Option(
-            "--latency-us", help="Latency of a message; measured on several ranks if absent."
-        ),
-    ] = None,
-    bandwidth: Annotated[
-        float | None,
-        typer.Option(
-            "--bandwidth-GB-per-s", help="Bandwidth of a message; given with the latency."
-        ),
-    ] = None,
+    ranks: str = "64,512,4096",
+    latency_us: float | None = None,
+    bandwidth_GB_per_s: float | None = None,
 ) -> int:
-    """Collective."""
+    """Predict the time of a step on many ranks.
+
+    It follows from latency and bandwidth of messages: those between the ranks that it is started
+    on, or given ones. On several ranks it also times all messages of a step between them.
+
+    Example: mpirun -n 8 --oversubscribe catenary scaling ambrosio2012 --ranks 64,512,4096 --set
+    line.n_spans=10000
+
+    Parameters
+    ----------
+    ranks N,... : Numbers of ranks.
+    latency_us : Latency of a message; measured on several ranks if absent.
+    bandwidth_GB_per_s : Bandwidth of a message; given with the latency.
+    """
     from catenary.cases.run.cluster import Wire, Work, work_of
     from catenary.cases.studies import scaling as study
     from catenary.cases.studies.sweep.variants import whole_numbers
 
-    if (latency is None) != (bandwidth is None):
+    if (latency_us is None) != (bandwidth_GB_per_s is None):
         raise InputError("--latency-us and --bandwidth-GB-per-s belong together; give both")
     given = None
-    if latency is not None and bandwidth is not None:
-        if not (0.0 < latency <= 1e6 and 1e-6 <= bandwidth <= 1e6):
+    if latency_us is not None and bandwidth_GB_per_s is not None:
+        if not (0.0 < latency_us <= 1e6 and 1e-6 <= bandwidth_GB_per_s <= 1e6):
             raise InputError(
-                f"--latency-us {latency:g} must be above 0 and at most 1e6, --bandwidth-GB-per-s "
-                f"{bandwidth:g} between 1e-6 and 1e6"
+                f"--latency-us {latency_us:g} must be above 0 and at most 1e6, "
+                f"--bandwidth-GB-per-s {bandwidth_GB_per_s:g} between 1e-6 and 1e6"
             )
-        given = Wire(1e-6 * latency, 1e-9 / bandwidth)
+        given = Wire(1e-6 * latency_us, 1e-9 / bandwidth_GB_per_s)
     numbers = whole_numbers(ranks, "--ranks", 1, study.MOST_RANKS, "64,512,4096")
     comm = console.world() if launched_by_mpirun() else None
     several = comm is not None and comm.size > 1
@@ -285,27 +270,25 @@ def scaling(
     return console.DONE
 
 
-@verb(
-    "reference",
-    help="Make the reference solutions anew. Models of EN 50318 at two speeds under one and two "
-    "pantographs are refined in step and mesh, with error bars. Takes an hour; the same "
-    "command continues what was stopped.",
-    epilog="Example: catenary reference ac_simple -o results/reference -j 0",
-)
+@verb("reference")
 def reference(
     out: Out,
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="NAME",
-            help="Models (ac_simple, ac_stitched, dc_simple) or configurations "
-            "(ac_simple_275_one); all if absent.",
-        ),
-    ] = None,
+    names: Annotated[list[str] | None, typer.Argument()] = None,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Make the reference solutions anew.
+
+    Models of EN 50318 at two speeds under one and two pantographs are refined in step and mesh,
+    with error bars. Takes an hour; the same command continues what was stopped.
+
+    Example: catenary reference ac_simple -o results/reference -j 0
+
+    Parameters
+    ----------
+    names NAME : Models (ac_simple, ac_stitched, dc_simple) or configurations (ac_simple_275_one);
+        all if absent.
+    """
     from catenary.cases.studies.reference.solutions import configurations, jobs_of
 
     def read() -> tuple[tuple[list[Configuration], list[Job]], list[str]]:
@@ -326,44 +309,35 @@ def reference(
     return console.DONE
 
 
-@serial_verb(
-    "judge",
-    help="Compare results of any program with reference solutions. It prints differences, error "
-    "bars, tolerances of EN 50318 and verdicts.",
-    epilog="Example: catenary judge forces.csv --of ac_simple_275_one -o results/judged",
-)
+@serial_verb("judge")
 def judge(
-    files: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="FILE",
-            help="CSV files: forces (place_m or time_s, pantograph_N or leading_N and trailing_N) "
-            "or statistics (configuration, of, quantity, value).",
-        ),
-    ],
-    configuration: Annotated[
-        str | None,
-        typer.Option(
-            "--of", metavar="NAME", help="Configuration of the files, such as ac_simple_275_one."
-        ),
-    ] = None,
-    unfiltered: Annotated[
-        bool,
-        typer.Option("--unfiltered", help="Forces have not passed the 20 Hz filter of EN 50317."),
-    ] = False,
-    out: Annotated[
-        Path | None, folder_option("Folder for page, table and picture; none if absent.")
-    ] = None,
+    files: list[Path],
+    of: str | None = None,
+    unfiltered: bool = False,
+    out: OutIfAny = None,
     strict: Strict = False,
     force: Force = False,
 ) -> int:
-    """Serial."""
+    """Compare results of any program with reference solutions.
+
+    It prints differences, error bars, tolerances of EN 50318 and verdicts.
+
+    Example: catenary judge forces.csv --of ac_simple_275_one -o results/judged
+
+    Parameters
+    ----------
+    files FILE : CSV files: forces (place_m or time_s, pantograph_N or leading_N and trailing_N) or
+        statistics (configuration, of, quantity, value).
+    of NAME : Configuration of the files, such as ac_simple_275_one.
+    unfiltered : Forces have not passed the 20 Hz filter of EN 50317.
+    out : Folder for page, table and picture; none if absent.
+    """
     if out is not None:
         refuse_table(out / "judged.csv", force)
     from catenary.cases.studies.reference import validation
     from catenary.cases.studies.reference.judgement import any_failed, read_results
 
-    found = read_results(files, configuration, not unfiltered)
+    found = read_results(files, of, not unfiltered)
     if unfiltered and not any(one.forces for one in found):
         raise InputError("--unfiltered belongs to forces over time; these files hold statistics")
     leave(out, validation.judged_text(found), lambda: validation.judged_files(found))
@@ -372,28 +346,25 @@ def judge(
     )
 
 
-@verb(
-    "validate",
-    help="Validate this installation by the steps of EN 50318. Line at rest, reference model of "
-    "2002, reference models in the manner of 2018, a line test; it writes the statement with "
-    "all figures.",
-    epilog="Example: catenary validate -o results/validation -j 0",
-)
+@verb("validate")
 def validate(
     out: Out,
-    measured: Annotated[
-        Path | None,
-        typer.Option(
-            "--measured",
-            metavar="FOLDER",
-            help="Folder of `catenary compare RUN FILE -o FOLDER`: a line test beside its run.",
-        ),
-    ] = None,
+    measured: Path | None = None,
     strict: Strict = False,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Validate this installation by the steps of EN 50318.
+
+    Line at rest, reference model of 2002, reference models in the manner of 2018, a line test; it
+    writes the statement with all figures.
+
+    Example: catenary validate -o results/validation -j 0
+
+    Parameters
+    ----------
+    measured FOLDER : Folder of `catenary compare RUN FILE -o FOLDER`: a line test beside its run.
+    """
     from catenary.cases.studies.reference import validation
 
     def read() -> tuple[tuple[list[Job], validation.Step], list[str]]:

@@ -10,7 +10,7 @@ import typer
 
 from catenary.base.errors import InputError
 from catenary.base.files import is_file
-from catenary.cases.cli.app import Force, SceneWords, folder_option, leave, serial_verb
+from catenary.cases.cli.app import Force, OutIfAny, SceneWords, leave, serial_verb
 from catenary.cases.result_folder.output_folder import (
     refuse_impossible,
     refuse_table,
@@ -27,62 +27,48 @@ EXCITATIONS = ("pantograph", "force", "pulse", "hammer")
 
 @dataclass
 class WaveWords(SceneWords):
-    """The scene whose waves are analysed, or the folder of a run in the place of its case."""
+    """The scene whose waves are analysed, or the folder of a run in the place of its case.
 
-    case: Annotated[
-        str,
-        typer.Argument(help="A case, which is run with a snapshot every 10 ms, or a run's folder."),
-    ]
+    Parameters
+    ----------
+    case : A case, which is run with a snapshot every 10 ms, or a run's folder.
+    """
+
+    case: str
 
 
-@serial_verb(
-    "waves",
-    help="Analyse wave propagation along a line. A train, a moving force, a pulse or a hammer "
-    "excites the line. Pictures show its motion in space and time, in the frame of the train, "
-    "and over wavenumber and frequency, its energy ahead and behind, and pass bands and group "
-    "velocities of the periodic line. `catenary separation` shows how two pantographs act on "
-    "each other.",
-    epilog="Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves; "
-    "catenary waves en50318_2002 --excite hammer --at-m 630 -o results/hammer",
-)
+@serial_verb("waves")
 def waves(
     words: WaveWords,
     excited: Excited,
-    out: Annotated[Path | None, folder_option("Folder for the results of a case.")] = None,
-    excite: Annotated[
-        str,
-        typer.Option(
-            metavar="|".join(EXCITATIONS), help="What sets the line of a case into motion."
-        ),
-    ] = EXCITATIONS[0],
-    obstacles: Annotated[
-        bool,
-        typer.Option(
-            "--obstacles",
-            help="Measure what each kind of obstacle of the line sends back and lets through, "
-            "beside theory, and nothing else.",
-        ),
-    ] = False,
-    window_error: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SPANS,...",
-            help="March the whole line and windows of so many moving spans, and draw the error of "
-            "the contact force over their size, and nothing else.",
-        ),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="KEY=V1,V2,...",
-            help="With --window-error: a curve for each value, or combination of those of several "
-            "keys.",
-        ),
-    ] = None,
+    out: OutIfAny = None,
+    excite: Annotated[str, typer.Option(metavar="|".join(EXCITATIONS))] = EXCITATIONS[0],
+    obstacles: bool = False,
+    window_error: str | None = None,
+    vary: list[str] | None = None,
     force: Force = False,
 ) -> int:
-    """Serial."""
+    """Analyse wave propagation along a line.
+
+    A train, a moving force, a pulse or a hammer excites the line. Pictures show its motion in space
+    and time, in the frame of the train, and over wavenumber and frequency, its energy ahead and
+    behind, and pass bands and group velocities of the periodic line. `catenary separation` shows
+    how two pantographs act on each other.
+
+    Example: catenary waves en50318_2002 -o results/waves; catenary waves results/waves; catenary
+    waves en50318_2002 --excite hammer --at-m 630 -o results/hammer
+
+    Parameters
+    ----------
+    out : Folder for the results of a case.
+    excite : What sets the line of a case into motion.
+    obstacles : Measure what each kind of obstacle of the line sends back and lets through, beside
+        theory, and nothing else.
+    window_error SPANS,... : March the whole line and windows of so many moving spans, and draw the
+        error of the contact force over their size, and nothing else.
+    vary KEY=V1,V2,... : With --window-error: a curve for each value, or combination of those of
+        several keys.
+    """
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.studies.waves import study
 
