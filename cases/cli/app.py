@@ -250,32 +250,33 @@ class SceneWords:
     shortened: Annotated[bool, typer.Option("--short")] = False
 
     def split(self) -> tuple[list[str], list[str]]:
-        """All assignments, and options for PETSc."""
+        """All assignments, and options for PETSc, which only verbs of ``RunWords`` take."""
         from catenary.cases.process.petsc_options import split_extras
 
         more, options = split_extras(self.extras or [])
+        if options and not isinstance(self, RunWords):
+            raise InputError(f"{options[0]} after -- is an option for PETSc; this verb takes none")
         return [*(self.assignments or []), *more], options
 
     @property
     def changes(self) -> list[str]:
-        """All assignments of a verb that takes no options for PETSc."""
-        changes, options = self.split()
-        if options:
-            raise InputError(f"{options[0]} after -- is an option for PETSc; this verb takes none")
-        return changes
+        """All assignments."""
+        return self.split()[0]
 
-    def draft(self) -> tuple[Draft, list[str]]:
-        """The case with its assignments, not checked, and options for PETSc. Not collective."""
+    @property
+    def petsc(self) -> list[str]:
+        """Options for PETSc."""
+        return self.split()[1]
+
+    def draft(self, *further: str) -> Draft:
+        """The case with its assignments, and further ones, not checked. Not collective."""
         from catenary.cases.scene.load import read_draft
 
-        changes, options = self.split()
-        return read_draft(self.case, changes, self.shortened), options
+        return read_draft(self.case, [*self.changes, *further], self.shortened)
 
     def scene(self, *further: str) -> catenary.Scene:
-        """The scene, with further assignments, as Python programs have it. Not collective."""
-        from catenary.cases.scene.load import read_draft
-
-        return catenary.Scene(read_draft(self.case, [*self.changes, *further], self.shortened))
+        """The scene of that, as Python programs have it. Not collective."""
+        return catenary.Scene(self.draft(*further))
 
     def load(self, *further: str) -> Scene:
         """The tables of that scene. Not collective."""
@@ -304,10 +305,10 @@ class StudyRuns:
     verbose: Verbose = False
 
     def begin(
-        self, read: Callable[[], tuple[T, list[str]]], scene_of: Callable[[T], Scene]
+        self, read: Callable[[], T], scene_of: Callable[[T], Scene], petsc: Sequence[str] = ()
     ) -> tuple[Any, T, RunOptions]:
         """Communicator, what ``read`` gives, and options of the runs; see ``begin``. Collective."""
-        comm, what, arguments = begin(read, self.verbose, scene_of)
+        comm, what, arguments = begin(read, scene_of, petsc, self.verbose)
         from catenary.cases.studies.sweep.jobs import RunOptions
 
         return comm, what, RunOptions(self.force, arguments, console.say, self.n_jobs)
@@ -380,12 +381,11 @@ def crowded(comm: Any) -> str:
 
 
 def begin(
-    read: Callable[[], tuple[T, list[str]]], verbose: bool, scene_of: Callable[[T], Scene]
+    read: Callable[[], T], scene_of: Callable[[T], Scene], petsc: Sequence[str], verbose: bool
 ) -> tuple[Any, T, list[str]]:
     """Communicator, what ``read`` gives on rank 0, the options with which PETSc now runs.
 
-    Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
-    whose ``[petsc]`` table stands before them.
+    Collective. These are those of the ``[petsc]`` table of a scene, then those of the command line.
     """
     from catenary.cases.process.petsc_options import (
         as_arguments,
@@ -394,17 +394,19 @@ def begin(
         start_petsc,
     )
 
-    # A process of its own is refused before MPI has started.
-    read_before = None if launched_by_mpirun() else read()
+    is_alone = not launched_by_mpirun()
+    if is_alone:  # it is refused before MPI has started
+        what = read()
     comm = console.world()
     if lone := lone_task(comm.size):
         console.warn(lone)
     abort_on_unforeseen_error(comm)
     set_up_logging(comm, verbose, console.is_quiet())
-    what, options = read_before or on_root(comm, read, takes_long=True)
+    if not is_alone:
+        what = on_root(comm, read, takes_long=True)
     table = scene_of(what).petsc.given()
-    arguments = as_arguments(table, options)
-    on_root(comm, lambda: refuse_unwritable(options))
+    arguments = as_arguments(table, petsc)
+    on_root(comm, lambda: refuse_unwritable(petsc))
     start_petsc(arguments)
 
     def warn() -> None:

@@ -60,7 +60,7 @@ def run(
     from catenary.cases.scene.load import load_scene
 
     if study:
-        from catenary.cases.cli.studies.variants import run_study
+        from catenary.cases.cli.variants import run_study
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")
@@ -70,12 +70,11 @@ def run(
     if runs.n_jobs != 1 or part is not None:
         raise InputError("-j and --part belong to --study; mpirun shares a single run among ranks")
 
-    def read() -> tuple[Scene, list[str]]:
-        changes, options = words.split()
+    def read() -> Scene:
         refuse_impossible(out)
-        return load_scene(words.case, changes, words.shortened), options
+        return load_scene(words.case, words.changes, words.shortened)
 
-    comm, scene, arguments = begin(read, runs.verbose, lambda scene: scene)
+    comm, scene, arguments = begin(read, lambda scene: scene, words.petsc, runs.verbose)
     from catenary.cases.run.arrivals import arrival_warnings
     from catenary.runs import run_into
     from catenary.solver.problem.problem import OFF
@@ -128,17 +127,14 @@ def restart(
     force : Continue even without room for all results.
     """
     from catenary.cases.process.petsc_options import split_extras
+    from catenary.runs import go_on, scene_to_continue
 
-    def read() -> tuple[Scene, list[str]]:
-        from catenary.runs import scene_to_continue
-
-        more, options = split_extras(extras or [])
-        if more:
-            raise InputError(f"{more[0]} cannot be changed when a run is continued")
-        return scene_to_continue(folder, until_m, evaluate), options
-
-    comm, scene, arguments = begin(read, verbose, lambda scene: scene)
-    from catenary.runs import go_on
+    more, petsc = split_extras(extras or [])
+    if more:
+        raise InputError(f"{more[0]} cannot be changed when a run is continued")
+    comm, scene, arguments = begin(
+        lambda: scene_to_continue(folder, until_m, evaluate), lambda scene: scene, petsc, verbose
+    )
     from catenary.solver.problem.problem import OFF
 
     if (crowd := crowded(comm)) and scene.window.mode == OFF:
@@ -294,7 +290,7 @@ def _array_script(
     study: bool,
 ) -> str:
     """The script of a sweep or study whose scenes are all checked."""
-    from catenary.cases.cli.studies.variants import read_variants
+    from catenary.cases.cli.variants import read_variants
     from catenary.cases.run.cluster import array_script
     from catenary.cases.run.needs import total_needs
     from catenary.cases.studies.case_study import make_plan
@@ -308,7 +304,7 @@ def _array_script(
         verb = ["run", *case_words, "--study"]
     else:
         variants = read_variants(vary, named)
-        jobs = whole_runs_of(words.draft()[0], variants, out).jobs
+        jobs = whole_runs_of(words.draft(), variants, out).jobs
         verb = ["sweep", *case_words, *(word for text in vary or [] for word in ("--vary", text))]
         verb += [] if named is None else ["--variants", str(named.absolute())]
     needs = total_needs(each.scene for each in jobs)

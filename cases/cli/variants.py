@@ -39,7 +39,6 @@ from catenary.cases.terminal import console
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from catenary.cases.scene.load import Draft
     from catenary.cases.studies.planned_sweep import PlannedSweep
     from catenary.cases.studies.sweep.jobs import Ended
     from catenary.cases.studies.sweep.variants import Variant
@@ -95,8 +94,8 @@ def sweep(
             "a part has no pictures: leave --plot and --histogram to the sweep after all parts"
         )
 
-    def read() -> tuple[PlannedSweep, list[str]]:
-        draft, options = words.draft()
+    def read() -> PlannedSweep:
+        draft = words.draft()
         check_names(names_in(plot), STATISTICS, "statistic")
         sampling = None
         if sample is None:
@@ -109,7 +108,7 @@ def sweep(
             variants, sampling = samples_of(sample, draft)
         if reports and only_statistics:
             raise InputError("--only-statistics leaves nothing that --reports could draw")
-        made = plan_sweep(
+        return plan_sweep(
             draft,
             variants,
             out,
@@ -119,9 +118,8 @@ def sweep(
             histories=names_in(histories),
             force=runs.force,
         )
-        return made, options
 
-    comm, made, options = runs.begin(read, lambda made: made.own.first)
+    comm, made, options = runs.begin(read, lambda made: made.own.first, words.petsc)
     refused = made.own.refused
     for one in refused[:_SHOWN_REFUSED]:
         console.warn(f"variant {one.variant.name} is not run: {one.outcome}")
@@ -169,15 +167,14 @@ def run_study(words: RunWords, out: Path, runs: StudyRuns, part: str | None) -> 
 
     own = None if part is None else parse_part(part)
 
-    def read() -> tuple[Plan, list[str]]:
+    def read() -> Plan:
         refuse_impossible(out)
-        changes, options = words.split()
         console.say(
             f"--study runs the program {find_study(words.case)}, which may do all that you may"
         )
-        return make_plan(words.case, changes, words.shortened), options
+        return make_plan(words.case, words.changes, words.shortened)
 
-    comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene)
+    comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene, words.petsc)
     from catenary.cases.studies import case_study
 
     if own is not None:
@@ -283,15 +280,10 @@ class TaskWords(SceneWords):
     n_jobs: Jobs = 1
     force: Force = False
 
-    def make(self, verb: str, study: Callable[..., Made]) -> int:
+    def make(self, verb: str, study: Callable[..., Made]) -> None:
         """Make the study and print what it found. Serial."""
-        from catenary.cases.scene.load import read_draft
-
-        def read() -> tuple[Draft, Path]:
-            return read_draft(self.case, self.changes, self.shortened), self.task_file
-
         made = study(
-            read,
+            lambda: (self.draft(), self.task_file),
             self.out,
             command=f"catenary {verb} {self.case}",
             jobs=self.n_jobs,
@@ -300,11 +292,10 @@ class TaskWords(SceneWords):
             say=console.say,
         )
         print_findings(made.text, made.files)
-        return console.DONE
 
 
 @serial_verb("optimise")
-def optimise(words: TaskWords) -> int:
+def optimise(words: TaskWords) -> None:
     """Choose numbers of a scene for the calmest contact force.
 
     Droppers, tensions, pantographs or any others are chosen for the smallest standard deviation of
@@ -316,11 +307,11 @@ def optimise(words: TaskWords) -> int:
     """
     from catenary.optimising import optima
 
-    return words.make("optimise", optima)
+    words.make("optimise", optima)
 
 
 @serial_verb("tolerance")
-def tolerance(words: TaskWords) -> int:
+def tolerance(words: TaskWords) -> None:
     """Find the tolerances within which the criteria hold.
 
     Droppers, heights, tensions or any numbers of a scene may be off so far that each acceptance
@@ -331,4 +322,4 @@ def tolerance(words: TaskWords) -> int:
     """
     from catenary.optimising import tolerances
 
-    return words.make("tolerance", tolerances)
+    words.make("tolerance", tolerances)

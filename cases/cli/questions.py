@@ -38,13 +38,13 @@ def _begun(words: RunWords, table: str, out: Path | None, runs: StudyRuns) -> Ma
     Collective.
     """
 
-    def read() -> tuple[tuple[Draft, Scene], list[str]]:
+    def read() -> tuple[Draft, Scene]:
         if out is not None:
             refuse_table(out / table, runs.force)
-        draft, options = words.draft()
-        return (draft, draft.scene()), options
+        draft = words.draft()
+        return draft, draft.scene()
 
-    comm, (draft, scene), options = runs.begin(read, lambda made: made[1])
+    comm, (draft, scene), options = runs.begin(read, lambda made: made[1], words.petsc)
     from catenary.cases.studies.sweep.together import Marching
 
     return Marching(draft, scene, out, comm, options)
@@ -66,7 +66,7 @@ def speed(
     out: OutIfAny = None,
     *,
     runs: StudyRuns,
-) -> int:
+) -> None:
     """Find the highest speed at which the criteria hold.
 
     They hold if they do in both directions, all together and each by itself: an ensemble over
@@ -87,7 +87,6 @@ def speed(
     marching, command = _begun(words, "speed.csv", out, runs), f"catenary speed {words.case}"
     found = find_speeds(marching, speeds, criterion or [], direction, command)
     print_findings(found.text, found.files)
-    return console.DONE
 
 
 @verb("separation")
@@ -97,7 +96,7 @@ def separation(
     out: OutIfAny = None,
     *,
     runs: StudyRuns,
-) -> int:
+) -> None:
     """Find good and bad distances of two pantographs.
 
     It prints deviation, least force and uplift over the distance, where acceptance criteria fail,
@@ -115,7 +114,6 @@ def separation(
     marching = _begun(words, "separation.csv", out, runs)
     found = find_separations(marching, distances, f"catenary separation {words.case}")
     print_findings(found.text, found.files)
-    return console.DONE
 
 
 @verb("what-if")
@@ -124,7 +122,7 @@ def what_if(
     out: OutIfAny = None,
     *,
     runs: StudyRuns,
-) -> int:
+) -> None:
     """Run a case with and without changes, and compare them.
 
     The changes are those of --set; compared are statistics, uplift by support, droppers, verdicts.
@@ -140,14 +138,15 @@ def what_if(
     from catenary.callers import temporary_folder
     from catenary.cases.studies.questions import what_if as question
 
-    def read() -> tuple[tuple[list[Job], list[str]], list[str]]:
-        changes, options = words.split()
+    changes = words.changes
+
+    def read() -> list[Job]:
         jobs = question.jobs_of(words.case, changes, words.shortened)
         if out is not None:
             refuse_table(out / "what_if.html", runs.force)
-        return (jobs, changes), options
+        return jobs
 
-    comm, (jobs, changes), options = runs.begin(read, lambda made: made[0][0].scene)
+    comm, jobs, options = runs.begin(read, lambda jobs: jobs[0].scene, words.petsc)
     from catenary.cases.studies.records import held_study
 
     with ExitStack() as stack:
@@ -157,7 +156,6 @@ def what_if(
         found = on_root(comm, lambda: question.differences(changes, ended, folder), takes_long=True)
         files = held.write(lambda: question.files_of(folder, found))
     print_findings(question.as_text(found), files)
-    return console.DONE
 
 
 @serial_verb("worst")

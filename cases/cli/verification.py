@@ -55,7 +55,7 @@ def accuracy(
     repeats: int = 3,
     *,
     runs: StudyRuns,
-) -> int:
+) -> None:
     """Find the step and mesh that a wanted accuracy needs.
 
     Step, mesh, scheme, coupling and models of a case are varied; the error and time of each setting
@@ -77,18 +77,14 @@ def accuracy(
 
     wanted = parse_target(target)
 
-    def read() -> tuple[Plan, list[str]]:
-        overrides, options = words.split()
+    def read() -> Plan:
         refuse_impossible(out)
         if not 1 <= repeats <= _MOST_REPEATS:
             raise InputError(f"--repeats {repeats} must be between 1 and {_MOST_REPEATS}")
-        chosen = parse_axes(axes)
-        plan = make_plan(
-            words.case, chosen, overrides, words.shortened, quick=quick, repeats=repeats
-        )
-        return plan, options
+        chosen, changes = parse_axes(axes), words.changes
+        return make_plan(words.case, chosen, changes, words.shortened, quick=quick, repeats=repeats)
 
-    comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene)
+    comm, plan, options = runs.begin(read, lambda made: made.jobs[0].scene, words.petsc)
     from catenary.cases.studies.accuracy import output
     from catenary.cases.studies.accuracy import runs as study
     from catenary.cases.studies.records import held_study
@@ -98,7 +94,6 @@ def accuracy(
         files = held.write(lambda: output.files_of(found, wanted))
     time_of_all = f"{counted(len(ended), 'run')}, {found.wall:.0f} s"
     print_findings(f"{output.as_text(found, wanted)}\n\n{time_of_all}", files)
-    return console.DONE
 
 
 @verb("hard")
@@ -130,7 +125,7 @@ def hard(
             refuse_table(out / HARD, runs.force)
         return hard_cases(names)
 
-    comm, cases, options = runs.begin(lambda: (read(), []), lambda cases: cases[0].scene())
+    comm, cases, options = runs.begin(read, lambda cases: cases[0].scene())
     from catenary.cases.process.petsc_options import start_petsc
     from catenary.cases.process.workers import at_once
     from catenary.cases.studies.hard import checks
@@ -196,13 +191,12 @@ def stability_map(
     quick : Few stiffnesses and masses.
     """
     from catenary.cases.process.workers import at_once
-    from catenary.cases.scene.load import read_draft
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.stability import map as study
 
     refuse_table(out / MAP, force)
     grid, comm = study.QUICK if quick else study.Grid(), console.alone()
-    draft = read_draft(words.case, words.changes, words.shortened)
+    draft = words.draft()
     with held_study(out, comm, f"catenary stability-map {words.case}", force) as held:
         found = study.make_map(draft, comm, grid, console.say, held.kept, at_once(n_jobs, comm))
         files = held.write(
@@ -218,7 +212,7 @@ def scaling(
     ranks: str = "64,512,4096",
     latency_us: float | None = None,
     bandwidth_GB_per_s: float | None = None,
-) -> int:
+) -> None:
     """Predict the time of a step on many ranks.
 
     It follows from latency and bandwidth of messages: those between the ranks that it is started
@@ -267,7 +261,6 @@ def scaling(
         exchange = (comm.size, *study.time_of_exchange(comm, found.sizes))
     assert wire is not None
     console.say(study.as_text(found, wire, numbers, given is None, exchange))
-    return console.DONE
 
 
 @verb("reference")
@@ -276,7 +269,7 @@ def reference(
     names: Annotated[list[str] | None, typer.Argument()] = None,
     *,
     runs: StudyRuns,
-) -> int:
+) -> None:
     """Make the reference solutions anew.
 
     Models of EN 50318 at two speeds under one and two pantographs are refined in step and mesh,
@@ -291,9 +284,9 @@ def reference(
     """
     from catenary.cases.studies.reference.solutions import configurations, jobs_of
 
-    def read() -> tuple[tuple[list[Configuration], list[Job]], list[str]]:
+    def read() -> tuple[list[Configuration], list[Job]]:
         chosen = configurations(names or ())
-        return (chosen, jobs_of(chosen)), []
+        return chosen, jobs_of(chosen)
 
     comm, (chosen, jobs), options = runs.begin(read, lambda made: made[1][0].scene)
     from catenary.cases.studies.accuracy.runs import RUNS, measure
@@ -306,7 +299,6 @@ def reference(
         ended = all_ended(run_jobs(jobs, out / RUNS, comm, options, measure=measure))
         files = held.write(lambda: solutions.files_of(chosen, ended))
     console.say("\n".join(map(str, files)))
-    return console.DONE
 
 
 @serial_verb("judge")
@@ -367,9 +359,9 @@ def validate(
     """
     from catenary.cases.studies.reference import validation
 
-    def read() -> tuple[tuple[list[Job], validation.Step], list[str]]:
+    def read() -> tuple[list[Job], validation.Step]:
         refuse_table(out / "validation.csv", runs.force)
-        return (validation.jobs_of_validation(), validation.line_test(measured)), []
+        return validation.jobs_of_validation(), validation.line_test(measured)
 
     comm, (jobs, tested), options = runs.begin(read, lambda made: made[0][0].scene)
     from catenary.cases.studies.accuracy.runs import RUNS
