@@ -177,12 +177,7 @@ def separations(
 
 @contextmanager
 def _marching(
-    scene: SceneLike,
-    out: str | Path | None,
-    table: str,
-    jobs: int,
-    force: bool,
-    progress: bool,
+    scene: SceneLike, out: str | Path | None, table: str, jobs: int, force: bool, progress: bool
 ) -> Iterator[Marching]:
     """The march of variants of a scene by a question that leaves a ``table`` in ``out``."""
     from catenary.cases.result_folder.output_folder import refuse_table
@@ -223,11 +218,7 @@ def find_speeds(
 
 
 def find_separations(
-    marching: Marching,
-    distances: Distances,
-    command: str = _PROGRAM,
-    *,
-    explained: bool = True,
+    marching: Marching, distances: Distances, command: str = _PROGRAM, *, explained: bool = True
 ) -> Answer:
     """March the distances of two pantographs, and write files if the marches have a folder.
 

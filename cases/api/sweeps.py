@@ -24,13 +24,7 @@ from catenary.callers import (
 )
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.scene.input.faults import shown
-from catenary.cases.studies.sweep.variants import (
-    Variant,
-    check_keys,
-    product,
-    text_of,
-    varied_key,
-)
+from catenary.cases.studies.sweep.variants import Variant, check_keys, product, text_of, varied_key
 from catenary.scenes import SceneLike, draft_of, plain_value, tables_or_file
 
 if TYPE_CHECKING:

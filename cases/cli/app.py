@@ -215,8 +215,7 @@ Vary = Annotated[
 NamedVariants = Annotated[
     Path | None,
     typer.Option(
-        "--variants",
-        help='TOML file of named variants, each a line name = ["key=value", ...].',
+        "--variants", help='TOML file of named variants, each a line name = ["key=value", ...].'
     ),
 ]
 NoReport = Annotated[

@@ -38,50 +38,33 @@ def list_cases(
     wanted FILTER : With --keys: a part of a key, or a pattern with * and ?; prints bounds, accepted
         words and typical values too. With --rules: a book, whose criteria and limits are printed.
     """
-    given = [
-        name
-        for name, on in (
-            ("--keys", keys),
-            ("--pantographs", pantographs),
-            ("--rules", rules),
-            ("--schema", schema),
-        )
-        if on
-    ]
+    asked = {"--keys": keys, "--pantographs": pantographs, "--rules": rules, "--schema": schema}
+    given = [name for name, on in asked.items() if on]
     if len(given) > 1:
         raise InputError(
             "list takes one of --keys, --pantographs, --rules and --schema, not "
             f"{' and '.join(given)}"
         )
-    if rules:
-        from catenary.cases.terminal.lists import book_table, criteria_text
-
-        console.say(book_table() if wanted is None else criteria_text(wanted))
-        return
-    if keys:
-        from catenary.cases.terminal.lists import key_details, key_table
-
-        console.say(key_table() if wanted is None else key_details(wanted))
-        return
-    if wanted is not None:
+    if wanted is not None and not (rules or keys):
         raise InputError(
             f"{wanted} filters keys or names a rule book: write `catenary list --keys {wanted}` or "
             f"`catenary list --rules {wanted}`"
         )
-    if schema:
-        from catenary.cases.terminal.lists import scene_schema
+    from catenary.cases.terminal import lists
 
-        console.say(json.dumps(scene_schema(), indent=1), whole=True)
-        return
-    if pantographs:
-        from catenary.cases.terminal.terminal_text import pantograph_table
+    if rules:
+        text = lists.book_table() if wanted is None else lists.criteria_text(wanted)
+    elif keys:
+        text = lists.key_table() if wanted is None else lists.key_details(wanted)
+    elif schema:
+        text = json.dumps(lists.scene_schema(), indent=1)
+    elif pantographs:
+        text = lists.pantograph_table()
+    else:
+        from catenary.scenes import shipped_cases
 
-        console.say(pantograph_table())
-        return
-    from catenary.cases.terminal import terminal_text
-    from catenary.scenes import shipped_cases
-
-    console.say(terminal_text.case_table(shipped_cases()))
+        text = lists.case_table(shipped_cases())
+    console.say(text, whole=schema)
 
 
 @serial_verb("new")

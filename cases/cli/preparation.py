@@ -142,9 +142,7 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
 
 
 @serial_verb("check")
-def check(
-    words: SceneWords,
-) -> int:
+def check(words: SceneWords) -> int:
     """Check a case without running it.
 
     It looks at keys, bounds, geometry, effects, mesh, pantographs, and whether a dropper is slack
@@ -169,9 +167,7 @@ def check(
 
 @serial_verb("mesh")
 def mesh(
-    words: SceneWords,
-    out: Annotated[Path, typer.Option("-o", "--out")],
-    force: Force = False,
+    words: SceneWords, out: Annotated[Path, typer.Option("-o", "--out")], force: Force = False
 ) -> None:
     """Write the mesh of a case, or draw its line to scale.
 
@@ -236,9 +232,7 @@ def static(
 
 @serial_verb("prepare")
 def prepare(
-    words: SceneWords,
-    out: Annotated[Path, typer.Option("-o", "--out")],
-    force: Force = False,
+    words: SceneWords, out: Annotated[Path, typer.Option("-o", "--out")], force: Force = False
 ) -> None:
     """Write a line and its pantographs for steps from outside.
 

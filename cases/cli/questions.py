@@ -91,11 +91,7 @@ def speed(
 
 @verb("separation")
 def separation(
-    words: RunWords,
-    distances: Distances,
-    out: OutIfAny = None,
-    *,
-    runs: StudyRuns,
+    words: RunWords, distances: Distances, out: OutIfAny = None, *, runs: StudyRuns
 ) -> None:
     """Find good and bad distances of two pantographs.
 
@@ -117,12 +113,7 @@ def separation(
 
 
 @verb("what-if")
-def what_if(
-    words: RunWords,
-    out: OutIfAny = None,
-    *,
-    runs: StudyRuns,
-) -> None:
+def what_if(words: RunWords, out: OutIfAny = None, *, runs: StudyRuns) -> None:
     """Run a case with and without changes, and compare them.
 
     The changes are those of --set; compared are statistics, uplift by support, droppers, verdicts.

@@ -16,11 +16,7 @@ from catenary.base.errors import InputError
 from catenary.base.files import is_file
 from catenary.cases.cli import command_words
 from catenary.cases.cli.app import Force, Out, OutIfAny, SceneWords, leave, serial_verb
-from catenary.cases.result_folder.output_folder import (
-    refuse_impossible,
-    refuse_table,
-    run_folder,
-)
+from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table, run_folder
 from catenary.cases.studies.asked import Excited, Frequencies
 from catenary.cases.terminal import console
 
@@ -52,12 +48,7 @@ def pantograph(
     out : Folder for receptance.csv, receptance.png and lumped.toml.
     fit N : Masses of the lumped model, 1 to 3; if absent two, or a lumped pantograph's own.
     """
-    from catenary.cases.studies.pantograph_response import (
-        FILES,
-        files_of,
-        study,
-        study_text,
-    )
+    from catenary.cases.studies.pantograph_response import FILES, files_of, study, study_text
 
     over.checked()
     if out is not None:
@@ -108,13 +99,7 @@ def sensitivity(
 
 
 @serial_verb("identify")
-def identify(
-    words: SceneWords,
-    measured: Path,
-    task: Path,
-    out: Out,
-    force: Force = False,
-) -> None:
+def identify(words: SceneWords, measured: Path, task: Path, out: Out, force: Force = False) -> None:
     """Find parameters of a case from a measured passage.
 
     Errors of dropper lengths, tensions, damping, masses and others follow from a measured contact
@@ -236,12 +221,7 @@ def waves(
 def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force: bool) -> None:
     """Runs ``--window-error``."""
     from catenary.cases.process.petsc_options import start_petsc
-    from catenary.cases.studies.sweep.variants import (
-        check_keys,
-        parse_vary,
-        product,
-        whole_numbers,
-    )
+    from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, whole_numbers
     from catenary.cases.studies.waves import window_error
 
     refuse_table(out / window_error.TABLE, force)

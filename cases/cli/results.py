@@ -241,10 +241,7 @@ def animate(
 
 @serial_verb("paraview")
 def paraview(
-    folder: RunFolder,
-    motion: Motion = None,
-    view: FromWhere = None,
-    state: bool = True,
+    folder: RunFolder, motion: Motion = None, view: FromWhere = None, state: bool = True
 ) -> None:
     """Write a script that opens a run in ParaView.
 

@@ -203,11 +203,7 @@ def verdict(ended: Sequence[Ended], what: str) -> int:
 
 
 @serial_verb("uncertainty")
-def uncertainty(
-    table: Path,
-    sample: Path | None = None,
-    out: OutIfAny = None,
-) -> None:
+def uncertainty(table: Path, sample: Path | None = None, out: OutIfAny = None) -> None:
     """Evaluate the table of a sweep with uncertain keys.
 
     It prints quantiles, probabilities that acceptance criteria fail and sensitivity indices, all
@@ -231,11 +227,7 @@ def uncertainty(
 
 
 @serial_verb("merge")
-def merge(
-    folders: list[Path],
-    out: Out,
-    force: Force = False,
-) -> None:
+def merge(folders: list[Path], out: Out, force: Force = False) -> None:
     """Join sweeps of one case that ran in several folders.
 
     Folders such as the parts of --part become one table, with their histories if all have some;

@@ -130,7 +130,7 @@ def hard(
     from catenary.cases.process.workers import at_once
     from catenary.cases.studies.hard import checks
     from catenary.cases.studies.records import held_study
-    from catenary.cases.terminal.runs_bar import RunsBar
+    from catenary.cases.terminal.terminal_text import RunsBar
     from catenary.postproc.report.study_table import remark_lines
 
     if comm.size > 1 and runs.n_jobs != 1:
@@ -172,11 +172,7 @@ def hard(
 
 @serial_verb("stability-map")
 def stability_map(
-    words: SceneWords,
-    out: Out,
-    quick: bool = False,
-    n_jobs: Jobs = 1,
-    force: Force = False,
+    words: SceneWords, out: Out, quick: bool = False, n_jobs: Jobs = 1, force: Force = False
 ) -> int:
     """Find the largest stable step of every coupling.
 
@@ -265,10 +261,7 @@ def scaling(
 
 @verb("reference")
 def reference(
-    out: Out,
-    names: Annotated[list[str] | None, typer.Argument()] = None,
-    *,
-    runs: StudyRuns,
+    out: Out, names: Annotated[list[str] | None, typer.Argument()] = None, *, runs: StudyRuns
 ) -> None:
     """Make the reference solutions anew.
 
@@ -340,11 +333,7 @@ def judge(
 
 @verb("validate")
 def validate(
-    out: Out,
-    measured: Path | None = None,
-    strict: Strict = False,
-    *,
-    runs: StudyRuns,
+    out: Out, measured: Path | None = None, strict: Strict = False, *, runs: StudyRuns
 ) -> int:
     """Validate this installation by the steps of EN 50318.
 

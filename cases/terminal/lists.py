@@ -1,11 +1,11 @@
-"""Lists of ``catenary list``: keys of a scene and their JSON schema, rule books, their criteria."""
+"""Lists of ``catenary list``: cases, keys, their JSON schema, pantographs, rule books, criteria."""
 
 from __future__ import annotations
 
 import difflib
 import fnmatch
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
 from catenary.cases.scene.keys.table import OneOrMore
 from catenary.cases.scene.keys.units import USUAL, Usual, unit_of, usual_range
 from catenary.cases.scene.scene import Scene
+from catenary.mbs.lumped_data import READY, ReadyPantograph
 from catenary.meshgen.topologies.all_topologies import registered
 from catenary.postproc.evaluate.wording import terminal_width
 from catenary.postproc.standards.rule_books import (
@@ -58,6 +59,12 @@ class Key:
         """Unit in brackets, "" where the key has none."""
         unit = unit_of(self.name)
         return f"[{unit}]" if unit else ""
+
+
+def case_table(titles: Mapping[str, str]) -> str:
+    """Names and titles of cases, one line each."""
+    width = max(map(len, titles), default=0)
+    return "\n".join(f"{name:{width}}  {title}" for name, title in titles.items())
 
 
 def keys_of_a_scene() -> list[Key]:
@@ -372,3 +379,37 @@ class _AsWritten(GenerateJsonSchema):
         if function.__name__ == "_year":
             return {"anyOf": [{"type": "integer"}, made]}
         return made
+
+
+def pantograph_table() -> str:
+    """Name, chain, forces and source of each ready pantograph, a few lines each."""
+    lines = []
+    for name, ready in READY.items():
+        chain = ready.chain
+        lines += [
+            name,
+            f"  {_numbers(chain.masses)} kg, head first; {_numbers(chain.stiffnesses)} N/m and "
+            f"{_numbers(chain.dampings)} N s/m below",
+            f"  {_force(ready)}",
+            f"  {ready.source}",
+        ]
+    return "\n".join(lines)
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
+
+def _signed(value: float) -> str:
+    return f" {'-' if value < 0 else '+'} {abs(value):g}"
+
+
+def _force(ready: ReadyPantograph) -> str:
+    if ready.static_force is None:
+        return "no force of its own: static_force_N or static_force_by_speed is needed"
+    text = f"{ready.static_force:g} N"
+    if any(ready.uplift):
+        a, b, c = ready.uplift
+        terms = f"{a:g} v^2{_signed(b)} v{_signed(c)} N"
+        text += f" + {terms} for v in km/h, never below {ready.static_force:g} N"
+    return text

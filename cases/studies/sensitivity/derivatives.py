@@ -16,8 +16,7 @@ from catenary.base.errors import InputError
 from catenary.cases.run.prepared import sound_rest
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.studies.sensitivity.parameters import ChangedScenes, Parameter, parameters_of
-from catenary.cases.terminal.runs_bar import RunsBar
-from catenary.cases.terminal.terminal_text import elasticity_text
+from catenary.cases.terminal.terminal_text import RunsBar, elasticity_text
 from catenary.meshgen.wires import Role
 from catenary.postproc.channels.header import places_on_train
 from catenary.postproc.evaluate import filters, statistics
