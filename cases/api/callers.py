@@ -53,8 +53,11 @@ def refuse_different(comm: Any, *given: object) -> None:
 
 
 @contextmanager
-def temporary_folder(comm: Any, what: str) -> Iterator[Path]:
-    """A folder of rank 0 that all know, removed at the end. Collective."""
+def given_or_temporary(folder: Path | None, comm: Any, what: str) -> Iterator[Path]:
+    """A folder, or else one of rank 0 that all know, removed at the end. Collective."""
+    if folder is not None:
+        yield folder
+        return
     with ExitStack() as stack:
 
         def make() -> str:

@@ -288,8 +288,7 @@ def _made(
     """
 
     n_jobs, folder = n_at_once(jobs), folder_of(out)
-    if folder is not None:
-        refuse_table(folder / table, force)
+    refuse_table(folder, table, force)
     draft, task = read()
     plan = make_plan(draft, read_task(tables_or_file(task, "task"), model))
     for sentence in plan.warnings:

@@ -183,8 +183,7 @@ def _marching(
     from catenary.cases.result_folder.output_folder import refuse_table
 
     n_jobs, folder = n_at_once(jobs), folder_of(out)
-    if folder is not None:
-        refuse_table(folder / table, force)
+    refuse_table(folder, table, force)
     given = scene_of(scene)
     own, comm = checked(given), alone()
     from catenary.cases.studies.sweep.jobs import RunOptions

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +15,11 @@ from catenary.base.parallel import on_root
 from catenary.callers import (
     communicator,
     folder_of,
+    given_or_temporary,
     number_of,
     path_of,
     progress_shown,
     refuse_different,
-    temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.result_folder.output_folder import (
@@ -90,8 +90,10 @@ def run(
     tables = checked(own)
     refuse_different(comm, draft_of(own).raw, given)
     in_memory = given is None
-    with _set_up(tables, progress, comm) as options, ExitStack() as stack:
-        folder = given or stack.enter_context(temporary_folder(comm, "run"))
+    with (
+        _set_up(tables, progress, comm) as options,
+        given_or_temporary(given, comm, "run") as folder,
+    ):
         only_summary = in_memory or not report
         made = run_into(folder, tables, comm, options, force=force, only_summary=only_summary)
         return _returned(made, comm, in_memory)

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
     from catenary.cases.studies.sweep.jobs import RunOptions
+    from catenary.cases.studies.sweep.variants import Variant
     from catenary.postproc.read.validation import Records
     from catenary.postproc.report.study_table import Content
 
@@ -202,22 +203,6 @@ PartOfRuns = Annotated[
         help="Make every N-th run from the I-th on, and no table: a task of a job array.",
     ),
 ]
-Vary = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--vary",
-        metavar="KEY=V1,V2,...",
-        autocompletion=command_words.assignments,
-        help="Values that a key takes; all combinations are run. Repeatable, or further keys with "
-        "several values follow directly; a word with a single value is an assignment.",
-    ),
-]
-NamedVariants = Annotated[
-    Path | None,
-    typer.Option(
-        "--variants", help='TOML file of named variants, each a line name = ["key=value", ...].'
-    ),
-]
 NoReport = Annotated[
     bool,
     typer.Option(
@@ -293,6 +278,53 @@ class RunWords(SceneWords):
     extras KEY=VALUE -- PETSC_OPTION : Further assignments after --set, and after -- options for
         PETSc.
     """
+
+
+@dataclass
+class VariantWords:
+    """Variants of a case.
+
+    Parameters
+    ----------
+    vary KEY=V1,V2,... : Values that a key takes; all combinations are run. Repeatable, or further
+        keys with several values follow directly; a word with a single value is an assignment.
+    named : TOML file of named variants, each a line name = ["key=value", ...].
+    """
+
+    vary: Annotated[
+        list[str] | None, typer.Option("--vary", autocompletion=command_words.assignments)
+    ] = None
+    named: Annotated[Path | None, typer.Option("--variants")] = None
+
+    def __bool__(self) -> bool:
+        """Whether any are given."""
+        return bool(self.vary) or self.named is not None
+
+    def read(self) -> list[Variant]:
+        """The variants.
+
+        Raises
+        ------
+        InputError
+            If there are none, or if a key is none of a scene.
+        """
+        from catenary.cases.studies.sweep.variants import (
+            VARY,
+            check_keys,
+            parse_vary,
+            product,
+            read_named,
+        )
+
+        if not self:
+            raise InputError(
+                "there is nothing to vary: give --vary key=v1,v2,..., --variants or --sample"
+            )
+        varied = [parse_vary(text) for text in self.vary or []]
+        check_keys(product(varied, {}), VARY)
+        table = {} if self.named is None else read_named(self.named)
+        check_keys(product([], table), f"in {self.named}")
+        return product(varied, table)
 
 
 @dataclass

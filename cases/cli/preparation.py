@@ -6,7 +6,6 @@ check, draw, print or write the scene's line.
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -100,7 +99,7 @@ def _within(option: str, value: float, low: float, high: float) -> float:
 
 def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
     """Runs ``--cost``; returns the exit code."""
-    from catenary.callers import temporary_folder
+    from catenary.callers import given_or_temporary
     from catenary.cases.process.petsc_options import as_arguments, start_petsc
     from catenary.cases.scene.load import load_scene
     from catenary.cases.studies.records import held_study
@@ -121,11 +120,11 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
         if not as_json:
             console.say(line)
 
-    with ExitStack() as stack:
-        held = stack.enter_context(held_study(out, comm, f"catenary plan {options.case} --cost"))
-        if out is not None:
-            refuse_table(out / effect_cost.RECORD, force)
-        folder = out or stack.enter_context(temporary_folder(comm, "cost"))
+    with (
+        held_study(out, comm, f"catenary plan {options.case} --cost") as held,
+        given_or_temporary(out, comm, "cost") as folder,
+    ):
+        refuse_table(out, effect_cost.RECORD, force)
         found = effect_cost.measure(options, folder / _RUNS, say, force, n_jobs)
         files = [] if found is None else held.write(lambda: effect_cost.files_of(found))
     if found is None:

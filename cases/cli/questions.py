@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +27,6 @@ from catenary.cases.terminal import console
 if TYPE_CHECKING:
     from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
-    from catenary.cases.studies.sweep.jobs import Job
     from catenary.cases.studies.sweep.together import Marching
 
 
@@ -39,8 +37,7 @@ def _begun(words: RunWords, table: str, out: Path | None, runs: StudyRuns) -> Ma
     """
 
     def read() -> tuple[Draft, Scene]:
-        if out is not None:
-            refuse_table(out / table, runs.force)
+        refuse_table(out, table, runs.force)
         draft = words.draft()
         return draft, draft.scene()
 
@@ -126,23 +123,24 @@ def what_if(words: RunWords, out: OutIfAny = None, *, runs: StudyRuns) -> None:
     ----------
     out : Folder for page, tables, pictures and both runs; none is kept if absent.
     """
-    from catenary.callers import temporary_folder
+    from catenary.callers import given_or_temporary
     from catenary.cases.studies.questions import what_if as question
+    from catenary.cases.studies.sweep.jobs import Job
 
     changes = words.changes
 
     def read() -> list[Job]:
         jobs = question.jobs_of(words.case, changes, words.shortened)
-        if out is not None:
-            refuse_table(out / "what_if.html", runs.force)
+        refuse_table(out, "what_if.html", runs.force)
         return jobs
 
     comm, jobs, options = runs.begin(read, lambda jobs: jobs[0].scene, words.petsc)
     from catenary.cases.studies.records import held_study
 
-    with ExitStack() as stack:
-        folder = out or stack.enter_context(temporary_folder(comm, "what_if"))
-        held = stack.enter_context(held_study(out, comm, f"catenary what-if {words.case}"))
+    with (
+        given_or_temporary(out, comm, "what_if") as folder,
+        held_study(out, comm, f"catenary what-if {words.case}") as held,
+    ):
         ended = question.run(jobs, folder, comm, options)
         found = on_root(comm, lambda: question.differences(changes, ended, folder), takes_long=True)
         files = held.write(lambda: question.files_of(folder, found))

@@ -51,9 +51,8 @@ def pantograph(
     from catenary.cases.studies.pantograph_response import FILES, files_of, study, study_text
 
     over.checked()
-    if out is not None:
-        for name in FILES:
-            refuse_table(out / name, force)
+    for name in FILES:
+        refuse_table(out, name, force)
     found = study(words.load(), kind, fit, over)
     leave(out, study_text(found), lambda: files_of(found))
 
@@ -89,8 +88,7 @@ def sensitivity(
     from catenary.parameters import AT_REST, SENSITIVITIES, derivatives, rest_derivatives
 
     scene = words.scene()
-    if out is not None:
-        refuse_table(out / (AT_REST if at_rest else SENSITIVITIES), force)
+    refuse_table(out, AT_REST if at_rest else SENSITIVITIES, force)
     if at_rest:
         found = rest_derivatives(scene, keys or [], droppers=droppers)
     else:
@@ -120,7 +118,7 @@ def identify(words: SceneWords, measured: Path, task: Path, out: Out, force: For
     scene = words.scene()
     from catenary.cases.studies.identification.output import PARAMETERS
 
-    refuse_table(out / PARAMETERS, force)
+    refuse_table(out, PARAMETERS, force)
     found = identified(scene, measured, wanted, console.say)
     leave(out, f"\n{found}", lambda: identified_files(found))
 
@@ -224,7 +222,7 @@ def _window_error(words: WaveWords, out: Path, text: str, vary: list[str], force
     from catenary.cases.studies.sweep.variants import check_keys, parse_vary, product, whole_numbers
     from catenary.cases.studies.waves import window_error
 
-    refuse_table(out / window_error.TABLE, force)
+    refuse_table(out, window_error.TABLE, force)
     bounds = window_error.LEAST, window_error.MOST
     sizes = whole_numbers(text, window_error.OPTION, *bounds, "8,16,24,40,54")
     variants = product([parse_vary(one) for one in vary], {}) if vary else []

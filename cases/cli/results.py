@@ -172,8 +172,7 @@ def _compare_measured(
     from catenary.postproc.measurements.comparison import compare_with
     from catenary.postproc.read.results import Results
 
-    if out is not None:
-        refuse_table(out / compared.PAGE, force)
+    refuse_table(out, compared.PAGE, force)
     table = read_table(file)
     if wanted is None:
         wanted = usual_description(table, file)

@@ -11,7 +11,6 @@ import typer
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.cases.cli.app import (
-    NamedVariants,
     NoReport,
     Out,
     PartOfRuns,
@@ -19,7 +18,7 @@ from catenary.cases.cli.app import (
     RunWords,
     Strict,
     StudyRuns,
-    Vary,
+    VariantWords,
     Verbose,
     begin,
     crowded,
@@ -187,8 +186,8 @@ def submit(
     minutes: Annotated[int | None, typer.Option(min=5, max=10**5)] = None,
     chain: Annotated[int, typer.Option(min=0, max=1000)] = 9,
     array: Annotated[int | None, typer.Option(min=1, max=10**5)] = None,
-    vary: Vary = None,
-    named: NamedVariants = None,
+    *,
+    varied: VariantWords,
     study: bool = False,
     sbatch: list[str] | None = None,
     before: list[str] | None = None,
@@ -220,7 +219,7 @@ def submit(
     from catenary.cases.scene.input.case_files import find_case, shipped
 
     refuse_impossible(out)
-    if array is None and (vary or named or study):
+    if array is None and (varied or study):
         raise InputError("--vary, --variants and --study belong to --array")
     chosen, options = words.split()
     # A folder in this place may have the name of a shipped case, as one for its results.
@@ -238,7 +237,7 @@ def submit(
         refuse_other_scene(out / RUN_FILE, scene)
         script = slurm_script(case_words, out, job, *_needs_on(scene, job), options)
     else:
-        script = _array_script(words, case_words, out, job, array, vary, named, study)
+        script = _array_script(words, case_words, out, job, array, varied, study)
     if print_:
         console.print_as_is(script)
         return
@@ -285,12 +284,10 @@ def _array_script(
     out: Path,
     job: SlurmJob,
     n_tasks: int,
-    vary: list[str] | None,
-    named: Path | None,
+    varied: VariantWords,
     study: bool,
 ) -> str:
     """The script of a sweep or study whose scenes are all checked."""
-    from catenary.cases.cli.variants import read_variants
     from catenary.cases.run.cluster import array_script
     from catenary.cases.run.needs import total_needs
     from catenary.cases.studies.case_study import make_plan
@@ -298,15 +295,15 @@ def _array_script(
 
     chosen, options = words.split()
     if study:
-        if vary or named:
+        if varied:
             raise InputError("--study has runs of its own; leave --vary and --variants away")
         jobs = make_plan(words.case, chosen, words.shortened).jobs
         verb = ["run", *case_words, "--study"]
     else:
-        variants = read_variants(vary, named)
-        jobs = whole_runs_of(words.draft(), variants, out).jobs
-        verb = ["sweep", *case_words, *(word for text in vary or [] for word in ("--vary", text))]
-        verb += [] if named is None else ["--variants", str(named.absolute())]
+        jobs = whole_runs_of(words.draft(), varied.read(), out).jobs
+        given = (word for text in varied.vary or [] for word in ("--vary", text))
+        verb = ["sweep", *case_words, *given]
+        verb += [] if varied.named is None else ["--variants", str(varied.named.absolute())]
     needs = total_needs(each.scene for each in jobs)
     return array_script(verb, out, job, n_tasks, needs, options)
 

@@ -18,14 +18,13 @@ from catenary.base.process import alone
 from catenary.cases.cli.app import (
     Force,
     Jobs,
-    NamedVariants,
     Out,
     OutIfAny,
     PartOfRuns,
     RunWords,
     SceneWords,
     StudyRuns,
-    Vary,
+    VariantWords,
     leave,
     names_in,
     print_findings,
@@ -39,9 +38,7 @@ from catenary.cases.terminal import console
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from catenary.cases.studies.planned_sweep import PlannedSweep
     from catenary.cases.studies.sweep.jobs import Ended
-    from catenary.cases.studies.sweep.variants import Variant
     from catenary.optimising import Made
 
 _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
@@ -51,8 +48,7 @@ _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
 def sweep(
     words: RunWords,
     out: Out,
-    vary: Vary = None,
-    named: NamedVariants = None,
+    varied: VariantWords,
     sample: Path | None = None,
     plot: str | None = None,
     reports: bool = False,
@@ -84,7 +80,7 @@ def sweep(
     histogram : Also write force_histogram.csv, the share of time in bins of the filtered contact
         force, and a picture of it.
     """
-    from catenary.cases.studies.planned_sweep import plan_sweep
+    from catenary.cases.studies.planned_sweep import PlannedSweep, plan_sweep
     from catenary.cases.studies.sweep.jobs import STATISTICS, check_names, parse_part
     from catenary.sweeps import samples_of
 
@@ -99,8 +95,8 @@ def sweep(
         check_names(names_in(plot), STATISTICS, "statistic")
         sampling = None
         if sample is None:
-            variants = read_variants(vary, named)
-        elif vary or named is not None:
+            variants = varied.read()
+        elif varied:
             raise InputError(
                 "--sample makes all variants itself: give neither --vary nor --variants"
             )
@@ -131,33 +127,6 @@ def sweep(
     found = made.run(comm, options, command, names_in(plot), histogram)
     print_findings(found.text, found.files)
     return verdict(found.ended, "sweep")
-
-
-def read_variants(vary: Sequence[str] | None, named: Path | None) -> list[Variant]:
-    """The variants of ``--vary`` and ``--variants``.
-
-    Raises
-    ------
-    InputError
-        If there are none, or if a key is none of a scene.
-    """
-    from catenary.cases.studies.sweep.variants import (
-        VARY,
-        check_keys,
-        parse_vary,
-        product,
-        read_named,
-    )
-
-    if not vary and named is None:
-        raise InputError(
-            "there is nothing to vary: give --vary key=v1,v2,..., --variants or --sample"
-        )
-    varied = [parse_vary(text) for text in vary or []]
-    check_keys(product(varied, {}), VARY)
-    table = {} if named is None else read_named(named)
-    check_keys(product([], table), f"in {named}")
-    return product(varied, table)
 
 
 def run_study(words: RunWords, out: Path, runs: StudyRuns, part: str | None) -> int:
@@ -250,7 +219,7 @@ def merge(folders: list[Path], out: Out, force: Force = False) -> None:
     refuse_impossible(out)
     # A sweep that runs there would replace the table when it ends.
     with held(out, alone(), "catenary merge"):
-        refuse_table(out / RECORD, force)
+        refuse_table(out, RECORD, force)
         merged = merged_sweeps.merge(parts)
         files, found, lacks = merged_sweeps.write(out, merged)
     if found is not None:

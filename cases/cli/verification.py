@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -32,13 +32,6 @@ from catenary.cases.cli.app import (
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
-
-if TYPE_CHECKING:
-    from catenary.cases.studies.accuracy.runs import Plan
-    from catenary.cases.studies.hard.cases import HardCase
-    from catenary.cases.studies.hard.checks import Criterion
-    from catenary.cases.studies.reference.solutions import Configuration
-    from catenary.cases.studies.sweep.jobs import Job
 
 _MOST_REPEATS = 99
 HARD, HARD_PAGE = "hard.csv", "hard.md"
@@ -73,7 +66,7 @@ def accuracy(
     """
     from catenary.cases.studies.accuracy.analysis import parse_target
     from catenary.cases.studies.accuracy.axes import parse_axes
-    from catenary.cases.studies.accuracy.runs import make_plan
+    from catenary.cases.studies.accuracy.runs import Plan, make_plan
 
     wanted = parse_target(target)
 
@@ -117,12 +110,10 @@ def hard(
     out : Folder for the table as hard.csv and hard.md.
     shortened : Shorter runs, steps halved once only.
     """
+    from catenary.cases.studies.hard.cases import HardCase, hard_cases
 
     def read() -> list[HardCase]:
-        from catenary.cases.studies.hard.cases import hard_cases
-
-        if out is not None:
-            refuse_table(out / HARD, runs.force)
+        refuse_table(out, HARD, runs.force)
         return hard_cases(names)
 
     comm, cases, options = runs.begin(read, lambda cases: cases[0].scene())
@@ -137,7 +128,7 @@ def hard(
         raise InputError(
             f"-j is {runs.n_jobs} on {comm.size} ranks, of which each case is to take all"
         )
-    found: list[Criterion] = []
+    found: list[checks.Criterion] = []
     remarks_of: dict[str, dict[str, list[str]]] = {}
     petsc = partial(start_petsc, list(options.petsc))
     with held_study(out, comm, "catenary hard", runs.force) as held:
@@ -190,7 +181,7 @@ def stability_map(
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.stability import map as study
 
-    refuse_table(out / MAP, force)
+    refuse_table(out, MAP, force)
     grid, comm = study.QUICK if quick else study.Grid(), console.alone()
     draft = words.draft()
     with held_study(out, comm, f"catenary stability-map {words.case}", force) as held:
@@ -275,17 +266,16 @@ def reference(
     names NAME : Models (ac_simple, ac_stitched, dc_simple) or configurations (ac_simple_275_one);
         all if absent.
     """
-    from catenary.cases.studies.reference.solutions import configurations, jobs_of
+    from catenary.cases.studies.reference import solutions
+    from catenary.cases.studies.sweep.jobs import Job, all_ended
 
-    def read() -> tuple[list[Configuration], list[Job]]:
-        chosen = configurations(names or ())
-        return chosen, jobs_of(chosen)
+    def read() -> tuple[list[solutions.Configuration], list[Job]]:
+        chosen = solutions.configurations(names or ())
+        return chosen, solutions.jobs_of(chosen)
 
     comm, (chosen, jobs), options = runs.begin(read, lambda made: made[1][0].scene)
     from catenary.cases.studies.accuracy.runs import RUNS, measure
     from catenary.cases.studies.records import held_study
-    from catenary.cases.studies.reference import solutions
-    from catenary.cases.studies.sweep.jobs import all_ended
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
     with held_study(out, comm, "catenary reference") as held:
@@ -317,8 +307,7 @@ def judge(
     unfiltered : Forces have not passed the 20 Hz filter of EN 50317.
     out : Folder for page, table and picture; none if absent.
     """
-    if out is not None:
-        refuse_table(out / "judged.csv", force)
+    refuse_table(out, "judged.csv", force)
     from catenary.cases.studies.reference import validation
     from catenary.cases.studies.reference.judgement import any_failed, read_results
 
@@ -347,16 +336,16 @@ def validate(
     measured FOLDER : Folder of `catenary compare RUN FILE -o FOLDER`: a line test beside its run.
     """
     from catenary.cases.studies.reference import validation
+    from catenary.cases.studies.sweep.jobs import Job, all_ended
 
     def read() -> tuple[list[Job], validation.Step]:
-        refuse_table(out / "validation.csv", runs.force)
+        refuse_table(out, "validation.csv", runs.force)
         return validation.jobs_of_validation(), validation.line_test(measured)
 
     comm, (jobs, tested), options = runs.begin(read, lambda made: made[0][0].scene)
     from catenary.cases.studies.accuracy.runs import RUNS
     from catenary.cases.studies.records import held_study
     from catenary.cases.studies.reference.judgement import any_failed
-    from catenary.cases.studies.sweep.jobs import all_ended
     from catenary.cases.studies.sweep.run_jobs import run_jobs
 
     with held_study(out, comm, "catenary validate") as held:
