@@ -8,7 +8,7 @@ import operator
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
@@ -180,10 +180,6 @@ def folder_of(out: Any) -> Path | None:
     return None if out is None else path_of(out, "out")
 
 
-def say_nothing(text: str) -> None:
-    """Say nothing."""
-
-
-def say_on_error_stream(text: str) -> None:
-    """Print a line to standard error."""
-    print(text, file=sys.stderr)
+def saying(progress: bool) -> Callable[[str], None]:
+    """Prints lines to standard error, or none without ``progress``."""
+    return lambda text: print(text, file=sys.stderr) if progress else None

@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.base.parallel import on_root
 from catenary.base.process import alone
-from catenary.callers import (
-    ending_as_python,
-    folder_of,
-    listed,
-    n_at_once,
-    number_of,
-    say_nothing,
-    say_on_error_stream,
-)
+from catenary.callers import ending_as_python, folder_of, listed, n_at_once, number_of, saying
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.studies.asked import Distances, Speeds
 from catenary.scenes import SceneLike, checked, draft_of, scene_of
@@ -189,9 +181,8 @@ def _marching(
     from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.cases.studies.sweep.together import Marching
 
-    say = say_on_error_stream if progress else say_nothing
     with options_of(own.petsc.given()) as petsc, ending_as_python():
-        options = RunOptions(force, petsc, say, n_jobs)
+        options = RunOptions(force, petsc, saying(progress), n_jobs)
         yield Marching(draft_of(given), own, folder, comm, options)
 
 

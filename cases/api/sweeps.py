@@ -18,8 +18,7 @@ from catenary.callers import (
     path_of,
     progress_shown,
     refuse_different,
-    say_nothing,
-    say_on_error_stream,
+    saying,
 )
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.scene.input.faults import shown
@@ -263,7 +262,6 @@ def sweep(
     else:
         variants, sampling = samples_of(sample, draft)
     refuse_different(comm, draft.raw, variants, given)
-    say = say_on_error_stream if progress else say_nothing
     with given_or_temporary(given, comm, "sweep") as folder:
         made = plan_sweep(
             draft,
@@ -275,7 +273,7 @@ def sweep(
             force=force,
         )
         with options_of(made.own.first.petsc.given()) as petsc, progress_shown(False, comm):
-            options = RunOptions(force, petsc, say if comm.rank == 0 else say_nothing, n_jobs)
+            options = RunOptions(force, petsc, saying(progress and comm.rank == 0), n_jobs)
             drawn = None if given is None else ()
             found = made.run(comm, options, "a sweep of a Python program", drawn)
     if interrupted(found.ended):

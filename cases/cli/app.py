@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import typer
-from typer.models import ArgumentInfo
+from typer.models import ArgumentInfo, ParameterInfo
 
 import catenary
 from catenary.base.errors import InputError
-from catenary.base.options import Flag
+from catenary.base.options import Bounds
 from catenary.base.parallel import (
     abort_on_unforeseen_error,
     launched_by_mpirun,
@@ -76,8 +76,9 @@ def verb(name: str, *, serial: bool = False) -> Callable[[Command], Any]:
     """Adds a function as a verb, see ``console.guarded``; a serial one runs on rank 0 alone.
 
     Its docstring is the help: sentences, then an example, then for each parameter ``name : help``
-    or ``name METAVAR : help``. A parameter is an option if it has a default, with the name of the
-    parameter; ``Annotated`` says what is not so. One that is a dataclass stands for its fields.
+    or ``name METAVAR : help``. A parameter with a default is an option of its name, one without an
+    argument; ``Annotated`` has other flags as texts, ``Bounds``, or all that Typer knows. One that
+    is a dataclass stands for its fields.
     """
 
     def added(function: Command) -> Any:
@@ -133,32 +134,33 @@ def _parameter(
 ) -> inspect.Parameter:
     """A parameter of a command, with its help out of ``about``, where that has more to say."""
     kind, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    flag = "--" + name.strip("_").replace("_", "-")
-    if marks and isinstance(marks[0], Flag):
-        mark: Any = typer.Option(marks[0].name, help=marks[0].help, metavar=marks[0].metavar)
-    elif marks:
-        mark = copy(marks[0])
-    elif default is inspect.Parameter.empty:
+    flags = [mark for mark in marks if isinstance(mark, str)]
+    least, most = next((mark for mark in marks if isinstance(mark, Bounds)), (None, None))
+    if marks and isinstance(marks[0], ParameterInfo):
+        mark: Any = copy(marks[0])
+    elif default is inspect.Parameter.empty and not flags:
         mark = typer.Argument()
-    else:  # Typer makes a pair of a truth: --state and --no-state
-        mark = typer.Option() if default is True else typer.Option(flag)
+    elif default is True:  # of which Typer makes a pair: --state and --no-state
+        mark = typer.Option()
+    else:
+        own = flags or ["--" + name.strip("_").replace("_", "-")]
+        mark = typer.Option(*own, min=least, max=most)
     metavar, mark.help = about.pop(name, (None, mark.help))
     mark.metavar = metavar or mark.metavar
-    own = Annotated[kind, mark]  # type: ignore[valid-type]
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=own)
+    hint = Annotated[kind, mark]  # type: ignore[valid-type]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
 
 
 def _fields_of(name: str, group: Any) -> dict[str, inspect.Parameter]:
-    """The fields of a dataclass as parameters; a ``Flag`` is an option of the group's own."""
+    """The fields of a dataclass as parameters, of other names where they state an option."""
     about: dict[str, tuple[str | None, str]] = {}
     for own in reversed(group.__mro__):
         about |= _documented(own)[1]
     found = {}
     for field, hint in get_type_hints(group, include_extras=True).items():
-        is_own = any(isinstance(mark, Flag) for mark in getattr(hint, "__metadata__", ()))
         default = getattr(group, field, inspect.Parameter.empty)
         found[field] = _parameter(field, hint, default, about)
-        if is_own:
+        if isinstance(getattr(hint, "__metadata__", (None,))[0], str):
             found[field] = found[field].replace(name=f"{name}_{field}")
     return found
 
@@ -231,7 +233,7 @@ class SceneWords:
     assignments: Annotated[
         list[str] | None, typer.Option("--set", autocompletion=command_words.assignments)
     ] = None
-    shortened: Annotated[bool, typer.Option("--short")] = False
+    shortened: Annotated[bool, "--short"] = False
 
     def split(self) -> tuple[list[str], list[str]]:
         """All assignments, and options for PETSc, which only verbs of ``RunWords`` take."""
@@ -294,7 +296,7 @@ class VariantWords:
     vary: Annotated[
         list[str] | None, typer.Option("--vary", autocompletion=command_words.assignments)
     ] = None
-    named: Annotated[Path | None, typer.Option("--variants")] = None
+    named: Annotated[Path | None, "--variants"] = None
 
     def __bool__(self) -> bool:
         """Whether any are given."""

@@ -9,8 +9,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 import catenary
 from catenary.base.errors import InputError
 from catenary.base.parallel import launched_by_mpirun
@@ -165,9 +163,7 @@ def check(words: SceneWords) -> int:
 
 
 @serial_verb("mesh")
-def mesh(
-    words: SceneWords, out: Annotated[Path, typer.Option("-o", "--out")], force: Force = False
-) -> None:
+def mesh(words: SceneWords, out: Annotated[Path, "-o", "--out"], force: Force = False) -> None:
     """Write the mesh of a case, or draw its line to scale.
 
     The mesh is a Gmsh file; the drawing shows the line at rest.
@@ -193,7 +189,7 @@ def mesh(
 @serial_verb("static")
 def static(
     words: SceneWords,
-    out: Annotated[Path | None, typer.Option("-o", "--out")] = None,
+    out: Annotated[Path | None, "-o", "--out"] = None,
     force: Force = False,
     registration: bool = False,
     temperatures: str | None = None,
@@ -230,9 +226,7 @@ def static(
 
 
 @serial_verb("prepare")
-def prepare(
-    words: SceneWords, out: Annotated[Path, typer.Option("-o", "--out")], force: Force = False
-) -> None:
+def prepare(words: SceneWords, out: Annotated[Path, "-o", "--out"], force: Force = False) -> None:
     """Write a line and its pantographs for steps from outside.
 
     A C program, a real-time computer or a controller in Python takes these steps.

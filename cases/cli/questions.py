@@ -6,8 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from catenary.base.options import Bounds
 from catenary.base.parallel import on_root
 from catenary.cases.cli.app import (
     OutIfAny,
@@ -150,7 +149,7 @@ def what_if(words: RunWords, out: OutIfAny = None, *, runs: StudyRuns) -> None:
 @serial_verb("worst")
 def worst(
     folder: RunFolder,
-    count: Annotated[int, typer.Option("-n", "--count", min=1, max=1000)] = 3,
+    count: Annotated[int, "-n", "--count", Bounds(1, 1000)] = 3,
     out: OutIfAny = None,
 ) -> None:
     """Name the worst spans, supports and droppers of a run.

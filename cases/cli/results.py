@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.files import is_file, is_folder
@@ -14,24 +12,11 @@ from catenary.cases.cli.app import Force, OutIfAny, RunFolder, records_of, seria
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 from catenary.postproc.files.own_files import RUN_FILE
-from catenary.postproc.film.options import FilmOptions, View
+from catenary.postproc.film.options import FilmOptions, Motion, View
 
 if TYPE_CHECKING:
     from catenary.mbs.shape import Shape
     from catenary.postproc.read.validation import Records
-
-
-Motion = Annotated[
-    float | None,
-    typer.Option("--motion", min=1, max=1e5, help="Factor by which displacements are enlarged."),
-]
-FromWhere = Annotated[
-    View | None,
-    typer.Option(
-        help="From the side, from the side and above, from above, or from behind the train; "
-        "oblique if absent where wires lie beside each other, side otherwise."
-    ),
-]
 
 
 @serial_verb("report")
@@ -185,37 +170,16 @@ def _compare_measured(
 
 
 @serial_verb("animate")
-def animate(
-    folder: RunFolder,
-    start: Annotated[float | None, typer.Option("--from", min=0, max=1e7)] = None,
-    end: Annotated[float | None, typer.Option("--to", min=0, max=1e7)] = None,
-    rate: Annotated[float, typer.Option("--fps", min=1, max=120)] = 25.0,
-    every: Annotated[float | None, typer.Option("--every-m", min=1e-3, max=1e4)] = None,
-    width: Annotated[float | None, typer.Option("--width-m", min=5, max=2000)] = None,
-    motion: Motion = None,
-    view: FromWhere = None,
-    camera: str | None = None,
-) -> None:
+def animate(folder: RunFolder, options: FilmOptions) -> None:
     """Make a film of a run, film.mp4 and film.gif.
 
     It shows the line and its pantographs, the contact force beneath, from the snapshots of
     fields.h5.
 
     Example: catenary animate results/en300 --from 2 --to 6 --camera trailing
-
-    Parameters
-    ----------
-    start : Simulated time to begin at [s].
-    end : Simulated time to end at [s].
-    rate : Frames per second.
-    every : Travel of the train between two frames; a hundredth of their width if absent.
-    width : Line in the picture; some two spans if absent.
-    camera : Pantograph that the camera follows: its name, or its number from the front; the middle
-        of all if absent.
     """
     from catenary.postproc.film.animate import animate as make_film
 
-    options = FilmOptions(start, end, rate, every, width, motion, view, camera)
     records = records_of(folder)
     shapes = _shapes(folder, records)
     film = make_film(folder, options, records, not console.is_quiet(), shapes)
@@ -240,7 +204,7 @@ def animate(
 
 @serial_verb("paraview")
 def paraview(
-    folder: RunFolder, motion: Motion = None, view: FromWhere = None, state: bool = True
+    folder: RunFolder, motion: Motion = None, view: View | None = None, state: bool = True
 ) -> None:
     """Write a script that opens a run in ParaView.
 
@@ -251,6 +215,9 @@ def paraview(
 
     Parameters
     ----------
+    motion : Factor by which displacements are enlarged.
+    view : From the side, from the side and above, from above, or from behind the train; oblique if
+        absent where wires lie beside each other, side otherwise.
     state : Let ParaView write view.pvsm, which opens the same without Python.
     """
     import shutil

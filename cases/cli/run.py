@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError, RunBroken
+from catenary.base.options import Bounds
 from catenary.cases.cli.app import (
     NoReport,
     Out,
@@ -181,11 +182,11 @@ def _end(made: catenary.Run, strict: bool) -> int:
 def submit(
     words: RunWords,
     out: Out,
-    ranks: Annotated[int, typer.Option(min=1, max=10**6)] = 1,
-    nodes: Annotated[int, typer.Option(min=1, max=10**5)] = 1,
-    minutes: Annotated[int | None, typer.Option(min=5, max=10**5)] = None,
-    chain: Annotated[int, typer.Option(min=0, max=1000)] = 9,
-    array: Annotated[int | None, typer.Option(min=1, max=10**5)] = None,
+    ranks: Annotated[int, Bounds(1, 10**6)] = 1,
+    nodes: Annotated[int, Bounds(1, 10**5)] = 1,
+    minutes: Annotated[int | None, Bounds(5, 10**5)] = None,
+    chain: Annotated[int, Bounds(0, 1000)] = 9,
+    array: Annotated[int | None, Bounds(1, 10**5)] = None,
     *,
     varied: VariantWords,
     study: bool = False,

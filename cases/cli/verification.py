@@ -93,7 +93,7 @@ def accuracy(
 def hard(
     names: Annotated[list[str] | None, typer.Argument()] = None,
     out: OutIfAny = None,
-    shortened: Annotated[bool, typer.Option("--short")] = False,
+    shortened: Annotated[bool, "--short"] = False,
     *,
     runs: StudyRuns,
 ) -> int:
