@@ -12,15 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import catenary
 from catenary.base.errors import InputError
 from catenary.base.parallel import launched_by_mpirun
-from catenary.cases.cli.app import (
-    Force,
-    Jobs,
-    OutIfAny,
-    SceneWords,
-    names_in,
-    print_findings,
-    serial_verb,
-)
+from catenary.cases.cli.app import print_findings, serial_verb
+from catenary.cases.cli.command_words import Force, Jobs, OutIfAny, SceneWords, names_in
 from catenary.cases.result_folder.output_folder import new_file, refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted

@@ -8,17 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from catenary.base.options import Bounds
 from catenary.base.parallel import on_root
-from catenary.cases.cli.app import (
-    OutIfAny,
-    RunFolder,
-    RunWords,
-    StudyRuns,
-    leave,
-    print_findings,
-    records_of,
-    serial_verb,
-    verb,
-)
+from catenary.cases.cli.app import leave, print_findings, serial_verb, verb
+from catenary.cases.cli.command_words import OutIfAny, RunFolder, RunWords, StudyRuns, records_of
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.studies.asked import Distances, Speeds
 from catenary.cases.terminal import console

@@ -15,7 +15,8 @@ import typer
 from catenary.base.errors import InputError
 from catenary.base.files import is_file
 from catenary.cases.cli import command_words
-from catenary.cases.cli.app import Force, Out, OutIfAny, SceneWords, leave, serial_verb
+from catenary.cases.cli.app import leave, serial_verb
+from catenary.cases.cli.command_words import Force, Out, OutIfAny, SceneWords
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table, run_folder
 from catenary.cases.studies.asked import Excited, Frequencies
 from catenary.cases.terminal import console

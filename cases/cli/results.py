@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.files import is_file, is_folder
-from catenary.cases.cli.app import Force, OutIfAny, RunFolder, records_of, serial_verb
+from catenary.cases.cli.app import serial_verb
+from catenary.cases.cli.command_words import Force, OutIfAny, RunFolder, records_of
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 from catenary.postproc.files.own_files import RUN_FILE

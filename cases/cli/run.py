@@ -11,7 +11,8 @@ import typer
 
 from catenary.base.errors import InputError, RunBroken
 from catenary.base.options import Bounds
-from catenary.cases.cli.app import (
+from catenary.cases.cli.app import begin, crowded, serial_verb, verb
+from catenary.cases.cli.command_words import (
     NoReport,
     Out,
     PartOfRuns,
@@ -21,10 +22,6 @@ from catenary.cases.cli.app import (
     StudyRuns,
     VariantWords,
     Verbose,
-    begin,
-    crowded,
-    serial_verb,
-    verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console

@@ -15,7 +15,8 @@ import catenary
 from catenary.base.errors import InputError
 from catenary.base.files import is_folder
 from catenary.base.process import alone
-from catenary.cases.cli.app import (
+from catenary.cases.cli.app import leave, print_findings, serial_verb, verb
+from catenary.cases.cli.command_words import (
     Force,
     Jobs,
     Out,
@@ -25,11 +26,7 @@ from catenary.cases.cli.app import (
     SceneWords,
     StudyRuns,
     VariantWords,
-    leave,
     names_in,
-    print_findings,
-    serial_verb,
-    verb,
 )
 from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table

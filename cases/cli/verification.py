@@ -15,7 +15,8 @@ import typer
 from catenary.base.errors import InputError
 from catenary.base.parallel import launched_by_mpirun, on_root
 from catenary.cases.cli import command_words
-from catenary.cases.cli.app import (
+from catenary.cases.cli.app import leave, print_findings, serial_verb, verb
+from catenary.cases.cli.command_words import (
     Force,
     Jobs,
     Out,
@@ -24,10 +25,6 @@ from catenary.cases.cli.app import (
     SceneWords,
     Strict,
     StudyRuns,
-    leave,
-    print_findings,
-    serial_verb,
-    verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible, refuse_table
 from catenary.cases.terminal import console

@@ -16,7 +16,8 @@ from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.cli.app import Force, RunWords, SceneWords, app, serial_verb, verb
+from catenary.cases.cli.app import app, serial_verb, verb
+from catenary.cases.cli.command_words import Force, RunWords, SceneWords
 from catenary.cases.terminal import console
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line
