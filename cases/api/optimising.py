@@ -253,33 +253,11 @@ def _made(
 ) -> Made:
     """Plan a study, find what it looks for, and leave what its ``output`` writes. Not collective.
 
-    Parameters
-    ----------
-    model : class
-        Of the tables of the task.
-    make_plan, find : callable
-        Make the plan of a case and a task, and what is found by it.
-    output : module
-        Writes what is found, as text and as files.
-    table : str
-        One of these files.
-    read : callable
-        Gives the case and the task, once it is known that ``out`` can be taken.
-    out, jobs, force
-        As of ``optimise``.
-    command : str
-        Work of this process in words, for others that want the folder.
-    warn, say : callable
-        Called with sentences on the task, and with lines on the progress.
-
-    Raises
-    ------
-    InputError
-        As ``optimise`` and ``tolerance``.
-    Interrupted
-        If a signal ends the study.
+    ``read`` gives the case and the task, a table as ``model`` has it, once it is known that ``out``
+    can be taken and has no ``table`` of an earlier study. ``command`` says to others that want the
+    folder what this process does; ``warn`` gets sentences on the task, ``say`` lines on progress.
+    A signal raises ``Interrupted``; other errors are those of ``optimise``.
     """
-
     n_jobs, folder = n_at_once(jobs), folder_of(out)
     refuse_table(folder, table, force)
     draft, task = read()

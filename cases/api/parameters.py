@@ -243,19 +243,9 @@ def identify(
 def identified(
     scene: Scene, measured: str | Path | pd.DataFrame, task: Task, say: Callable[[str], None]
 ) -> Identified:
-    """Identify parameters of a checked scene by a checked task. Not collective.
+    """Identify parameters of a checked scene by a checked task, as ``identify``. Not collective.
 
-    Parameters
-    ----------
-    scene, measured, task
-        As of ``identify``.
-    say : callable
-        Called with a line on each march.
-
-    Raises
-    ------
-    InputError, RunBroken
-        As ``identify``.
+    ``say`` gets a line on each march.
     """
     import pandas as pd
 

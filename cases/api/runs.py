@@ -180,21 +180,10 @@ def run_into(
 
 
 def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None) -> CheckedScene:
-    """The checked scene with which a run goes on. Not collective.
+    """The checked scene with which the run in a folder goes on. Not collective.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder of the run.
-    until_m : float, optional
-        Where the leading pantograph is to stop [m], None for where it stops now.
-    evaluate : str, optional
-        FROM:TO [m], None for the stretch as it is.
-
-    Raises
-    ------
-    InputError
-        If there is no run, or as ``cases.run.continuing.extended_scene``.
+    ``until_m`` is where the leading pantograph is to stop [m], ``evaluate`` FROM:TO [m]; None for
+    both as they are. InputError if there is no run, or as ``cases.run.continuing.extended_scene``.
     """
     from catenary.cases.run.continuing import EVALUATE, UNTIL, extended_scene
     from catenary.postproc.read.guard import examined
