@@ -156,24 +156,30 @@ def restart(
 
     tables = on_root(comm, lambda: scene_to_continue(own, until, stretch), takes_long=True)
     with _set_up(tables, progress, comm) as options:
-        extends = until is not None
-        made = go_on(
-            own, tables, comm, options, force=force, extends=extends, only_summary=not report
-        )
+        how = {"force": force, "extends": until is not None, "only_summary": not report}
+        made = run_into(own, tables, comm, options, goes_on=True, **how)
         return _returned(made, comm)
 
 
 def run_into(
-    folder: Path, scene: CheckedScene, comm: Any, petsc_options: Sequence[str], **how: Any
+    folder: Path,
+    scene: CheckedScene,
+    comm: Any,
+    petsc_options: Sequence[str],
+    *,
+    goes_on: bool = False,
+    **how: Any,
 ) -> Run:
     """A run into a folder, however it ends, of which no file is open. Collective.
 
-    ``petsc_options`` are those that PETSc was started with; ``how`` and errors are those of
-    ``cases.run.runner.run_case``. The ``outcome`` of the run says how the march ended.
+    A run that is there ``goes_on`` with what ``scene_to_continue`` gave. PETSc was started with
+    ``petsc_options``; ``how`` and errors are those of ``cases.run.runner.run_case``, or of
+    ``restart_case``. The ``outcome`` of the run says how the march ended.
     """
-    from catenary.cases.run.runner import run_case
+    from catenary.cases.run import runner
 
-    ended = run_case(scene, folder, comm, petsc_options=petsc_options, **how)
+    march = runner.restart_case if goes_on else runner.run_case
+    ended = march(scene, folder, comm, petsc_options=petsc_options, **how)
     from catenary.results import Run  # reads results, which no march needs
 
     return Run(None, folder, ended)
@@ -196,21 +202,6 @@ def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None)
     with Results(folder, examined(folder)) as results:
         config = results.attributes["config"]
     return extended_scene(config, str(results.path), until_m, evaluate)
-
-
-def go_on(
-    folder: Path, scene: CheckedScene, comm: Any, petsc_options: Sequence[str], **how: Any
-) -> Run:
-    """A run that goes on, as of ``run_into``, with what ``scene_to_continue`` gave. Collective.
-
-    ``how`` and errors are those of ``cases.run.runner.restart_case``.
-    """
-    from catenary.cases.run.runner import restart_case
-
-    ended = restart_case(scene, folder, comm, petsc_options=petsc_options, **how)
-    from catenary.results import Run  # reads results, which no march needs
-
-    return Run(None, folder, ended)
 
 
 @contextmanager

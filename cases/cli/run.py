@@ -124,7 +124,7 @@ def restart(
     force : Continue even without room for all results.
     """
     from catenary.cases.process.petsc_options import split_extras
-    from catenary.runs import go_on, scene_to_continue
+    from catenary.runs import run_into, scene_to_continue
 
     more, petsc = split_extras(extras or [])
     if more:
@@ -136,11 +136,12 @@ def restart(
 
     if (crowd := crowded(comm)) and scene.window.mode == OFF:
         console.warn(crowd)
-    made = go_on(
+    made = run_into(
         folder,
         scene,
         comm,
         arguments,
+        goes_on=True,
         force=force,
         extends=until_m is not None,
         only_summary=no_report,
