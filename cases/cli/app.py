@@ -209,6 +209,8 @@ def _fields_of(name: str, group: Any) -> dict[str, inspect.Parameter]:
         found[field] = _parameter(field, hint, default, about)
         if isinstance(getattr(hint, "__metadata__", (None,))[0], str):
             found[field] = found[field].replace(name=f"{name}_{field}")
+    if about:
+        raise ValueError(f"{group.__name__} has no field {', '.join(about)}")
     return found
 
 

@@ -6,7 +6,7 @@ A channel is added in `test_one_more_channel`, unknowns and a load in `test_late
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -145,6 +145,25 @@ def test_a_verb_is_a_command_of_the_application() -> None:
     hello.__doc__ = f"{hello.__doc__}quiet_one : Not there."
     with pytest.raises(ValueError, match="hello has no parameter quiet_one"):
         verb("hello")(hello)
+
+    def bye(words: Misdescribed) -> None:
+        """Another one."""
+
+    with pytest.raises(ValueError, match="Misdescribed has no field loud"):
+        verb("bye")(bye)
+
+
+@dataclass
+class Misdescribed:
+    """Words of a verb.
+
+    Parameters
+    ----------
+    name : Name of the one who is greeted.
+    loud : Whether all hear it.
+    """
+
+    name: str
 
 
 CASE, SPEED = "en50318_2002", "train.speed_km_h"
