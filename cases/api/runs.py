@@ -176,9 +176,9 @@ def run_into(
     ``petsc_options``; ``how`` and errors are those of ``cases.run.runner.run_case``, or of
     ``restart_case``. The ``outcome`` of the run says how the march ended.
     """
-    from catenary.cases.run import runner
+    from catenary.cases.run.runner import restart_case, run_case
 
-    march = runner.restart_case if goes_on else runner.run_case
+    march: Any = restart_case if goes_on else run_case
     ended = march(scene, folder, comm, petsc_options=petsc_options, **how)
     from catenary.results import Run  # reads results, which no march needs
 
