@@ -8,7 +8,7 @@ import operator
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
@@ -53,8 +53,11 @@ def refuse_different(comm: Any, *given: object) -> None:
 
 
 @contextmanager
-def temporary_folder(comm: Any, what: str) -> Iterator[Path]:
-    """A folder of rank 0 that all know, removed at the end. Collective."""
+def given_or_temporary(folder: Path | None, comm: Any, what: str) -> Iterator[Path]:
+    """A folder, or else one of rank 0 that all know, removed at the end. Collective."""
+    if folder is not None:
+        yield folder
+        return
     with ExitStack() as stack:
 
         def make() -> str:
@@ -177,10 +180,6 @@ def folder_of(out: Any) -> Path | None:
     return None if out is None else path_of(out, "out")
 
 
-def say_nothing(text: str) -> None:
-    """Say nothing."""
-
-
-def say_on_error_stream(text: str) -> None:
-    """Print a line to standard error."""
-    print(text, file=sys.stderr)
+def saying(progress: bool) -> Callable[[str], None]:
+    """Prints lines to standard error, or none without ``progress``."""
+    return lambda text: print(text, file=sys.stderr) if progress else None

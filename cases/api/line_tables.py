@@ -390,14 +390,8 @@ def static(scene: SceneLike) -> AtRest:
 def write_rest(rest: AtRest, file: Path, registration: bool = False) -> None:
     """Write a line at rest: its droppers as CSV, or its steady arms, or all of it as JSON.
 
-    Not collective. The ending of the file decides; ``registration`` is for the steady arms.
-
-    Raises
-    ------
-    InputError
-        If the arms are wanted and none pulls a wire sideways.
-    RunBroken
-        If the disk refuses.
+    Not collective. The ending of the file decides; ``registration`` is for the steady arms, an
+    InputError if none pulls a wire sideways. RunBroken if the disk refuses.
     """
     from catenary.cases.run.at_rest import write_static
 

@@ -9,13 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.process import alone
-from catenary.callers import (
-    ending_as_python,
-    folder_of,
-    n_at_once,
-    say_nothing,
-    say_on_error_stream,
-)
+from catenary.callers import ending_as_python, folder_of, n_at_once, saying
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.studies.optimise.task import OptimiseTask
 from catenary.cases.studies.records import held_study
@@ -139,10 +133,9 @@ def optimise(
     >>> best.objective < best.shipped
     True
     """
-    own = scene_of(scene)
-    say = say_on_error_stream if progress else say_nothing
+    own, how = scene_of(scene), {"jobs": jobs, "force": force, "say": saying(progress)}
     with ending_as_python():
-        made = optima(lambda: (draft_of(own), task), out, jobs=jobs, force=force, say=say)
+        made = optima(lambda: (draft_of(own), task), out, **how)
     return [_optimum(own, made.plan, one) for one in made.found]
 
 
@@ -211,9 +204,9 @@ def tolerance(
 
     from catenary.cases.studies.tolerance.output import table_of
 
-    say = say_on_error_stream if progress else say_nothing
+    how = {"jobs": jobs, "force": force, "say": saying(progress)}
     with ending_as_python():
-        made = tolerances(lambda: (draft_of(scene), task), out, jobs=jobs, force=force, say=say)
+        made = tolerances(lambda: (draft_of(scene), task), out, **how)
     rows: Sequence[Mapping[str, Any]] = table_of(made.found).records()
     return pd.DataFrame(rows)
 
@@ -256,40 +249,17 @@ def _made(
     jobs: int = 1,
     force: bool = False,
     warn: Callable[[str], None] = logger.warning,
-    say: Callable[[str], None] = say_nothing,
+    say: Callable[[str], None],
 ) -> Made:
     """Plan a study, find what it looks for, and leave what its ``output`` writes. Not collective.
 
-    Parameters
-    ----------
-    model : class
-        Of the tables of the task.
-    make_plan, find : callable
-        Make the plan of a case and a task, and what is found by it.
-    output : module
-        Writes what is found, as text and as files.
-    table : str
-        One of these files.
-    read : callable
-        Gives the case and the task, once it is known that ``out`` can be taken.
-    out, jobs, force
-        As of ``optimise``.
-    command : str
-        Work of this process in words, for others that want the folder.
-    warn, say : callable
-        Called with sentences on the task, and with lines on the progress.
-
-    Raises
-    ------
-    InputError
-        As ``optimise`` and ``tolerance``.
-    Interrupted
-        If a signal ends the study.
+    ``read`` gives the case and the task, a table as ``model`` has it, once it is known that ``out``
+    can be taken and has no ``table`` of an earlier study. ``command`` says to others that want the
+    folder what this process does; ``warn`` gets sentences on the task, ``say`` lines on progress.
+    A signal raises ``Interrupted``; other errors are those of ``optimise``.
     """
-
     n_jobs, folder = n_at_once(jobs), folder_of(out)
-    if folder is not None:
-        refuse_table(folder / table, force)
+    refuse_table(folder, table, force)
     draft, task = read()
     plan = make_plan(draft, read_task(tables_or_file(task, "task"), model))
     for sentence in plan.warnings:

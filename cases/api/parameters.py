@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catenary.base.process import alone
-from catenary.callers import listed, path_of, progress_shown, say_nothing, say_on_error_stream
+from catenary.callers import listed, path_of, progress_shown, saying
 from catenary.postproc.evaluate.wording import counted
 from catenary.scenes import Scene, SceneLike, checked, scene_of, tables_or_file
 
@@ -237,29 +237,15 @@ def identify(
     [120.0]
     """
     own = scene_of(scene)
-    say = say_on_error_stream if progress else say_nothing
-    return identified(own, measured, task_of(task), say)
+    return identified(own, measured, task_of(task), saying(progress))
 
 
 def identified(
-    scene: Scene,
-    measured: str | Path | pd.DataFrame,
-    task: Task,
-    say: Callable[[str], None] = say_nothing,
+    scene: Scene, measured: str | Path | pd.DataFrame, task: Task, say: Callable[[str], None]
 ) -> Identified:
-    """Identify parameters of a checked scene by a checked task. Not collective.
+    """Identify parameters of a checked scene by a checked task, as ``identify``. Not collective.
 
-    Parameters
-    ----------
-    scene, measured, task
-        As of ``identify``.
-    say : callable
-        Called with a line on each march.
-
-    Raises
-    ------
-    InputError, RunBroken
-        As ``identify``.
+    ``say`` gets a line on each march.
     """
     import pandas as pd
 

@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.base.parallel import on_root
 from catenary.base.process import alone
-from catenary.callers import (
-    ending_as_python,
-    folder_of,
-    listed,
-    n_at_once,
-    number_of,
-    say_nothing,
-    say_on_error_stream,
-)
+from catenary.callers import ending_as_python, folder_of, listed, n_at_once, number_of, saying
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.studies.asked import Distances, Speeds
 from catenary.scenes import SceneLike, checked, draft_of, scene_of
@@ -177,27 +169,20 @@ def separations(
 
 @contextmanager
 def _marching(
-    scene: SceneLike,
-    out: str | Path | None,
-    table: str,
-    jobs: int,
-    force: bool,
-    progress: bool,
+    scene: SceneLike, out: str | Path | None, table: str, jobs: int, force: bool, progress: bool
 ) -> Iterator[Marching]:
     """The march of variants of a scene by a question that leaves a ``table`` in ``out``."""
     from catenary.cases.result_folder.output_folder import refuse_table
 
     n_jobs, folder = n_at_once(jobs), folder_of(out)
-    if folder is not None:
-        refuse_table(folder / table, force)
+    refuse_table(folder, table, force)
     given = scene_of(scene)
     own, comm = checked(given), alone()
     from catenary.cases.studies.sweep.jobs import RunOptions
     from catenary.cases.studies.sweep.together import Marching
 
-    say = say_on_error_stream if progress else say_nothing
     with options_of(own.petsc.given()) as petsc, ending_as_python():
-        options = RunOptions(force, petsc, say, n_jobs)
+        options = RunOptions(force, petsc, saying(progress), n_jobs)
         yield Marching(draft_of(given), own, folder, comm, options)
 
 
@@ -223,11 +208,7 @@ def find_speeds(
 
 
 def find_separations(
-    marching: Marching,
-    distances: Distances,
-    command: str = _PROGRAM,
-    *,
-    explained: bool = True,
+    marching: Marching, distances: Distances, command: str = _PROGRAM, *, explained: bool = True
 ) -> Answer:
     """March the distances of two pantographs, and write files if the marches have a folder.
 

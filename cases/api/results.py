@@ -196,10 +196,7 @@ class Run:
     """
 
     def __init__(
-        self,
-        results: Results | None,
-        folder: Path | None = None,
-        ended: RunOutcome | None = None,
+        self, results: Results | None, folder: Path | None = None, ended: RunOutcome | None = None
     ) -> None:
         """Results that are open, or None to open those of the folder when they are asked for;
         ``ended`` is how the run ended, if this process made it."""

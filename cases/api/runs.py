@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +15,11 @@ from catenary.base.parallel import on_root
 from catenary.callers import (
     communicator,
     folder_of,
+    given_or_temporary,
     number_of,
     path_of,
     progress_shown,
     refuse_different,
-    temporary_folder,
 )
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.result_folder.output_folder import (
@@ -90,8 +90,10 @@ def run(
     tables = checked(own)
     refuse_different(comm, draft_of(own).raw, given)
     in_memory = given is None
-    with _set_up(tables, progress, comm) as options, ExitStack() as stack:
-        folder = given or stack.enter_context(temporary_folder(comm, "run"))
+    with (
+        _set_up(tables, progress, comm) as options,
+        given_or_temporary(given, comm, "run") as folder,
+    ):
         only_summary = in_memory or not report
         made = run_into(folder, tables, comm, options, force=force, only_summary=only_summary)
         return _returned(made, comm, in_memory)
@@ -154,45 +156,40 @@ def restart(
 
     tables = on_root(comm, lambda: scene_to_continue(own, until, stretch), takes_long=True)
     with _set_up(tables, progress, comm) as options:
-        extends = until is not None
-        made = go_on(
-            own, tables, comm, options, force=force, extends=extends, only_summary=not report
-        )
+        how = {"force": force, "extends": until is not None, "only_summary": not report}
+        made = run_into(own, tables, comm, options, goes_on=True, **how)
         return _returned(made, comm)
 
 
 def run_into(
-    folder: Path, scene: CheckedScene, comm: Any, petsc_options: Sequence[str], **how: Any
+    folder: Path,
+    scene: CheckedScene,
+    comm: Any,
+    petsc_options: Sequence[str],
+    *,
+    goes_on: bool = False,
+    **how: Any,
 ) -> Run:
     """A run into a folder, however it ends, of which no file is open. Collective.
 
-    ``petsc_options`` are those that PETSc was started with; ``how`` and errors are those of
-    ``cases.run.runner.run_case``. The ``outcome`` of the run says how the march ended.
+    A run that is there ``goes_on`` with what ``scene_to_continue`` gave. PETSc was started with
+    ``petsc_options``; ``how`` and errors are those of ``cases.run.runner.run_case``, or of
+    ``restart_case``. The ``outcome`` of the run says how the march ended.
     """
-    from catenary.cases.run.runner import run_case
+    from catenary.cases.run.runner import restart_case, run_case
 
-    ended = run_case(scene, folder, comm, petsc_options=petsc_options, **how)
+    march: Any = restart_case if goes_on else run_case
+    ended = march(scene, folder, comm, petsc_options=petsc_options, **how)
     from catenary.results import Run  # reads results, which no march needs
 
     return Run(None, folder, ended)
 
 
 def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None) -> CheckedScene:
-    """The checked scene with which a run goes on. Not collective.
+    """The checked scene with which the run in a folder goes on. Not collective.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder of the run.
-    until_m : float, optional
-        Where the leading pantograph is to stop [m], None for where it stops now.
-    evaluate : str, optional
-        FROM:TO [m], None for the stretch as it is.
-
-    Raises
-    ------
-    InputError
-        If there is no run, or as ``cases.run.continuing.extended_scene``.
+    ``until_m`` is where the leading pantograph is to stop [m], ``evaluate`` FROM:TO [m]; None for
+    both as they are. InputError if there is no run, or as ``cases.run.continuing.extended_scene``.
     """
     from catenary.cases.run.continuing import EVALUATE, UNTIL, extended_scene
     from catenary.postproc.read.guard import examined
@@ -205,21 +202,6 @@ def scene_to_continue(folder: Path, until_m: float | None, evaluate: str | None)
     with Results(folder, examined(folder)) as results:
         config = results.attributes["config"]
     return extended_scene(config, str(results.path), until_m, evaluate)
-
-
-def go_on(
-    folder: Path, scene: CheckedScene, comm: Any, petsc_options: Sequence[str], **how: Any
-) -> Run:
-    """A run that goes on, as of ``run_into``, with what ``scene_to_continue`` gave. Collective.
-
-    ``how`` and errors are those of ``cases.run.runner.restart_case``.
-    """
-    from catenary.cases.run.runner import restart_case
-
-    ended = restart_case(scene, folder, comm, petsc_options=petsc_options, **how)
-    from catenary.results import Run  # reads results, which no march needs
-
-    return Run(None, folder, ended)
 
 
 @contextmanager

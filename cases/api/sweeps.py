@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,24 +12,17 @@ from catenary.base.parallel import on_root
 from catenary.callers import (
     communicator,
     folder_of,
+    given_or_temporary,
     listed,
     n_at_once,
     path_of,
     progress_shown,
     refuse_different,
-    say_nothing,
-    say_on_error_stream,
-    temporary_folder,
+    saying,
 )
 from catenary.cases.process.petsc_options import options_of
 from catenary.cases.scene.input.faults import shown
-from catenary.cases.studies.sweep.variants import (
-    Variant,
-    check_keys,
-    product,
-    text_of,
-    varied_key,
-)
+from catenary.cases.studies.sweep.variants import Variant, check_keys, product, text_of, varied_key
 from catenary.scenes import SceneLike, draft_of, plain_value, tables_or_file
 
 if TYPE_CHECKING:
@@ -270,9 +262,7 @@ def sweep(
     else:
         variants, sampling = samples_of(sample, draft)
     refuse_different(comm, draft.raw, variants, given)
-    say = say_on_error_stream if progress else say_nothing
-    with ExitStack() as stack:
-        folder = given or stack.enter_context(temporary_folder(comm, "sweep"))
+    with given_or_temporary(given, comm, "sweep") as folder:
         made = plan_sweep(
             draft,
             variants,
@@ -282,11 +272,10 @@ def sweep(
             histories=kept,
             force=force,
         )
-        options = stack.enter_context(options_of(made.own.first.petsc.given()))
-        stack.enter_context(progress_shown(False, comm))
-        plan = RunOptions(force, options, say if comm.rank == 0 else say_nothing, n_jobs)
-        drawn = None if given is None else ()
-        found = made.run(comm, plan, "a sweep of a Python program", drawn)
+        with options_of(made.own.first.petsc.given()) as petsc, progress_shown(False, comm):
+            options = RunOptions(force, petsc, saying(progress and comm.rank == 0), n_jobs)
+            drawn = None if given is None else ()
+            found = made.run(comm, options, "a sweep of a Python program", drawn)
     if interrupted(found.ended):
         raise KeyboardInterrupt
     # Of rank 0: times of a rank are its own.

@@ -1,45 +1,49 @@
-"""The application of the command line, options that verbs share, and how a verb starts.
+"""The application of the command line: how functions become its verbs, and how these start.
 
 Backends are imported inside the verbs, so that --help stays quick.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import os
+import re
 from copy import copy
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import typer
+from typer.core import TyperCommand
+from typer.models import ArgumentInfo, ParameterInfo
 
-import catenary
-from catenary.base.errors import InputError
+from catenary.base.options import Bounds
 from catenary.base.parallel import (
     abort_on_unforeseen_error,
     launched_by_mpirun,
     on_root,
     set_up_logging,
 )
-from catenary.cases.cli import command_words
-from catenary.cases.cli.command_words import Verb
-from catenary.cases.result_folder.output_folder import refuse_no_folder, run_folder
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from catenary.cases.scene.load import Draft
     from catenary.cases.scene.scene import Scene
-    from catenary.cases.studies.sweep.jobs import RunOptions
-    from catenary.postproc.read.validation import Records
     from catenary.postproc.report.study_table import Content
 
     Command = Callable[..., int | None]
 
 T = TypeVar("T")
+# A line of a docstring, ``name : help`` or ``name METAVAR : help``, with those that go on.
+_PARAMETER = re.compile(r"^(\w+)(?: (?!:)(.+?))? : (.+(?:\n +.+)*)", re.MULTILINE)
+
+VARY = "--vary"
+# Options of PETSc, whose first letter would be taken for an option of the verb, the rest for its
+# value: -options_view for -o.
+_OF_PETSC = re.compile(r"-(?!o)[a-z]+(_[a-z]+)+|-(options|on_error)_[a-z]+")
 
 app: typer.Typer = typer.Typer(
     name="catenary",
@@ -64,203 +68,158 @@ def narrowed(application: typer.Typer, words: Sequence[str]) -> typer.Typer:
     return application
 
 
-def verb(name: str, *, help: str, epilog: str, serial: bool = False) -> Callable[[Command], Any]:
-    """Adds a function as a verb, see ``console.guarded``; a serial one runs on rank 0 alone."""
+class Verb(TyperCommand):
+    """A verb; if it has ``--vary``, words directly after that one's value may be varied, too."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take the words of a command line apart. Not collective."""
+        for word in args[: args.index("--")] if "--" in args else args:
+            if _OF_PETSC.fullmatch(word):
+                ctx.fail(f"{word} is no option of {self.name}: those of PETSc stand after --")
+            if word.partition("=")[0] == "--set" and self._is_of_a_run():
+                ctx.fail(
+                    "the keys of a run stay as it recorded them: --set belongs to `catenary run`, "
+                    "with another folder for the new results"
+                )
+        if any(VARY in one.opts for one in self.params):
+            args = each_varied(args)
+        return super().parse_args(ctx, args)
+
+    def _is_of_a_run(self) -> bool:
+        """Whether the verb takes the folder of a run in place of a case."""
+        return any(one.metavar == "FOLDER" for one in self.params)  # type: ignore[attr-defined]
+
+
+def each_varied(words: Sequence[str]) -> list[str]:
+    """The words of a command line with ``--vary`` before each key that takes several values.
+
+    Words belong to the option that stands before them. Of those of ``--vary`` a word with a single
+    value stays a further assignment, as without ``--vary`` before it.
+    """
+    found: list[str] = []
+    is_value = follows = False
+    for number, word in enumerate(words):
+        if is_value:  # of --vary, whatever it is
+            is_value, follows = False, True
+        elif word == "--":  # behind it stand options for PETSc
+            return [*found, *words[number:]]
+        elif word.startswith("-"):
+            is_value, follows = word == VARY, word.startswith(f"{VARY}=")
+        elif follows and _has_several_values(word):
+            found.append(VARY)
+        found.append(word)
+    return found
+
+
+def _has_several_values(word: str) -> bool:
+    if "=" not in word or "," not in word:
+        return False
+    from catenary.cases.studies.sweep.variants import split_values
+
+    return len(split_values(word.partition("=")[2])) > 1
+
+
+def verb(name: str, *, serial: bool = False) -> Callable[[Command], Any]:
+    """Adds a function as a verb, see ``console.guarded``; a serial one runs on rank 0 alone.
+
+    Its docstring is the help: sentences, then an example, then for each parameter ``name : help``
+    or ``name METAVAR : help``. A parameter with a default is an option of its name, one without an
+    argument; ``Annotated`` has other flags as texts, ``Bounds``, or all that Typer knows. One that
+    is a dataclass stands for its fields.
+    """
 
     def added(function: Command) -> Any:
-        guarded = console.guarded(console.serial(function) if serial else function)
-        return app.command(name, cls=Verb, help=help, epilog=epilog)(guarded)
+        paragraphs, about = _documented(function)
+        about["quiet"] = None, "Print nothing but errors."
+        groups: dict[str, tuple[Any, dict[str, str]]] = {}
+        parameters = []
+        for one in inspect.signature(function, eval_str=True).parameters.values():
+            if not dataclasses.is_dataclass(one.annotation):
+                parameters.append(_parameter(one.name, one.annotation, one.default, about))
+                continue
+            own = _fields_of(one.name, one.annotation)
+            groups[one.name] = one.annotation, {field: own[field].name for field in own}
+            parameters += own.values()
+        quiet = Annotated[bool, typer.Option("-q", "--quiet")]
+        parameters.append(_parameter("quiet", quiet, False, about))
+        parameters.sort(key=_takes_the_rest)
+        if about:
+            raise ValueError(f"{name} has no parameter {', '.join(about)}")
+        run = console.serial(function) if serial else function
+
+        def gathered(**words: Any) -> int | None:
+            for group, (make, fields) in groups.items():
+                words[group] = make(**{field: words.pop(own) for field, own in fields.items()})
+            return run(**words)
+
+        command: Any = console.guarded(gathered)
+        # The command line is made from signature and annotations.
+        command.__signature__ = inspect.Signature(parameters)
+        command.__annotations__ = {one.name: one.annotation for one in parameters}
+        example = paragraphs.pop() if paragraphs[-1].startswith("Example: ") else None
+        app.command(name, cls=Verb, help=" ".join(paragraphs), epilog=example)(command)
+        return function
 
     return added
 
 
 serial_verb = partial(verb, serial=True)
-RunFolder = Annotated[
-    Path,
-    typer.Argument(parser=run_folder, metavar="FOLDER", help="Folder of a run, or its run.h5."),
-]
-Case = Annotated[
-    str,
-    typer.Argument(
-        help="Name of a shipped case, or a case.toml, or a folder with one.",
-        autocompletion=command_words.cases,
-    ),
-]
-Assignments = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Replace a key of the scene, KEY= takes it away; repeatable.",
-        autocompletion=command_words.assignments,
-    ),
-]
 
 
-def folder_option(what: str) -> Any:
-    """The option ``-o FOLDER`` with its line of help."""
-    return typer.Option("-o", "--out", parser=console.folder, metavar="<path>", help=what)
+def _documented(own: Any) -> tuple[list[str], dict[str, tuple[str | None, str]]]:
+    """Paragraphs of a docstring; metavar and help of its parameters by their names."""
+    text, _, section = inspect.cleandoc(own.__doc__ or "").partition("\n\nParameters\n----------\n")
+    about = {
+        name: (metavar or None, " ".join(help.split()))
+        for name, metavar, help in _PARAMETER.findall(section)
+    }
+    return [" ".join(paragraph.split()) for paragraph in text.split("\n\n")], about
 
 
-Out = Annotated[Path, folder_option("Folder for the results.")]
-MoreAssignments = Annotated[
-    list[str] | None,
-    typer.Argument(
-        metavar="KEY=VALUE",
-        help="Further assignments after --set.",
-        autocompletion=command_words.assignments,
-    ),
-]
-Shortened = Annotated[
-    bool, typer.Option("--short", help="Apply the case's [test] table, which shortens it.")
-]
-Force = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]
+def _parameter(
+    name: str, hint: Any, default: Any, about: dict[str, tuple[str | None, str]]
+) -> inspect.Parameter:
+    """A parameter of a command, with its help out of ``about``, where that has more to say."""
+    kind, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    flags = [mark for mark in marks if isinstance(mark, str)]
+    least, most = next((mark for mark in marks if isinstance(mark, Bounds)), (None, None))
+    if marks and isinstance(marks[0], ParameterInfo):
+        mark: Any = copy(marks[0])
+    elif default is inspect.Parameter.empty and not flags:
+        mark = typer.Argument()
+    elif default is True:  # of which Typer makes a pair: --state and --no-state
+        mark = typer.Option()
+    else:
+        own = flags or ["--" + name.strip("_").replace("_", "-")]
+        mark = typer.Option(*own, min=least, max=most)
+    metavar, mark.help = about.pop(name, (None, mark.help))
+    mark.metavar = metavar or mark.metavar
+    hint = Annotated[kind, mark]  # type: ignore[valid-type]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
 
 
-PetscOptions = Annotated[
-    list[str] | None,
-    typer.Argument(metavar="-- PETSC_OPTION", help="Options for PETSc, after --."),
-]
-MoreAndPetscOptions = Annotated[
-    list[str] | None,
-    typer.Argument(
-        metavar="KEY=VALUE -- PETSC_OPTION",
-        help="Further assignments after --set, and after -- options for PETSc.",
-        autocompletion=command_words.assignments,
-    ),
-]
+def _fields_of(name: str, group: Any) -> dict[str, inspect.Parameter]:
+    """The fields of a dataclass as parameters, of other names where they state an option."""
+    about: dict[str, tuple[str | None, str]] = {}
+    for own in reversed(group.__mro__):
+        about |= _documented(own)[1]
+    found = {}
+    for field, hint in get_type_hints(group, include_extras=True).items():
+        default = getattr(group, field, inspect.Parameter.empty)
+        found[field] = _parameter(field, hint, default, about)
+        if isinstance(getattr(hint, "__metadata__", (None,))[0], str):
+            found[field] = found[field].replace(name=f"{name}_{field}")
+    if about:
+        raise ValueError(f"{group.__name__} has no field {', '.join(about)}")
+    return found
 
 
-@dataclass
-class SceneWords:
-    """The scene of a verb: a case, and how it is changed.
-
-    Attributes
-    ----------
-    case : name, file or folder
-    extras, assignments : ``key=value`` each, those of ``--set`` first
-    shortened : whether the case's ``[test]`` table is applied
-    """
-
-    case: Case
-    extras: MoreAssignments = None
-    assignments: Assignments = None
-    shortened: Shortened = False
-
-    def split(self) -> tuple[list[str], list[str]]:
-        """All assignments, and options for PETSc."""
-        from catenary.cases.process.petsc_options import split_extras
-
-        more, options = split_extras(self.extras or [])
-        return [*(self.assignments or []), *more], options
-
-    @property
-    def changes(self) -> list[str]:
-        """All assignments of a verb that takes no options for PETSc."""
-        changes, options = self.split()
-        if options:
-            raise InputError(f"{options[0]} after -- is an option for PETSc; this verb takes none")
-        return changes
-
-    def draft(self) -> tuple[Draft, list[str]]:
-        """The case with its assignments, not checked, and options for PETSc. Not collective."""
-        from catenary.cases.scene.load import read_draft
-
-        changes, options = self.split()
-        return read_draft(self.case, changes, self.shortened), options
-
-    def scene(self, *further: str) -> catenary.Scene:
-        """The scene, with further assignments, as Python programs have it. Not collective."""
-        from catenary.cases.scene.load import read_draft
-
-        return catenary.Scene(read_draft(self.case, [*self.changes, *further], self.shortened))
-
-    def load(self, *further: str) -> Scene:
-        """The tables of that scene. Not collective."""
-        from catenary.scenes import checked
-
-        return checked(self.scene(*further))
-
-
-@dataclass
-class RunWords(SceneWords):
-    """The scene of a verb that runs it, and options for PETSc."""
-
-    extras: MoreAndPetscOptions = None
-
-
-Strict = Annotated[
-    bool, typer.Option("--strict", help="Exit with 3 if an acceptance criterion fails.")
-]
-Jobs = Annotated[
-    int,
-    typer.Option(
-        "-j",
-        "--jobs",
-        metavar="N",
-        min=0,
-        max=10**4,
-        help="Runs at the same time, each in a process of its own; 0: one on each core. Under "
-        "mpirun the number of ranks: a run on each.",
-    ),
-]
-PartOfRuns = Annotated[
-    str | None,
-    typer.Option(
-        "--part",
-        metavar="I/N",
-        help="Make every N-th run from the I-th on, and no table: a task of a job array.",
-    ),
-]
-Vary = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--vary",
-        metavar="KEY=V1,V2,...",
-        autocompletion=command_words.assignments,
-        help="Values that a key takes; all combinations are run. Repeatable, or further keys with "
-        "several values follow directly; a word with a single value is an assignment.",
-    ),
-]
-NamedVariants = Annotated[
-    Path | None,
-    typer.Option(
-        "--variants",
-        help='TOML file of named variants, each a line name = ["key=value", ...].',
-    ),
-]
-NoReport = Annotated[
-    bool,
-    typer.Option(
-        "--no-report", help="Write results and summary.json alone; catenary report does the rest."
-    ),
-]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print the time of each phase.")]
-
-
-@dataclass
-class StudyRuns:
-    """Options for the runs of a study.
-
-    Attributes
-    ----------
-    n_jobs : runs at the same time, 0 for one on each core
-    force : whether existing results are overwritten
-    verbose : whether the time of each phase is printed
-    """
-
-    n_jobs: Jobs = 1
-    force: Force = False
-    verbose: Verbose = False
-
-    def begin(
-        self, read: Callable[[], tuple[T, list[str]]], scene_of: Callable[[T], Scene]
-    ) -> tuple[Any, T, RunOptions]:
-        """Communicator, what ``read`` gives, and options of the runs; see ``begin``. Collective."""
-        comm, what, arguments = begin(read, self.verbose, scene_of)
-        from catenary.cases.studies.sweep.jobs import RunOptions
-
-        return comm, what, RunOptions(self.force, arguments, console.say, self.n_jobs)
+def _takes_the_rest(one: inspect.Parameter) -> bool:
+    """Whether a parameter stands for all further arguments, so that it comes behind the others."""
+    kind, mark = get_args(one.annotation)
+    return isinstance(mark, ArgumentInfo) and any(
+        get_origin(own) is list for own in (kind, *get_args(kind))
+    )
 
 
 def _version(wanted: bool) -> None:
@@ -330,12 +289,11 @@ def crowded(comm: Any) -> str:
 
 
 def begin(
-    read: Callable[[], tuple[T, list[str]]], verbose: bool, scene_of: Callable[[T], Scene]
+    read: Callable[[], T], scene_of: Callable[[T], Scene], petsc: Sequence[str], verbose: bool
 ) -> tuple[Any, T, list[str]]:
     """Communicator, what ``read`` gives on rank 0, the options with which PETSc now runs.
 
-    Collective. ``read`` also gives the command line's options for PETSc, ``scene_of`` the scene
-    whose ``[petsc]`` table stands before them.
+    Collective. These are those of the ``[petsc]`` table of a scene, then those of the command line.
     """
     from catenary.cases.process.petsc_options import (
         as_arguments,
@@ -344,17 +302,19 @@ def begin(
         start_petsc,
     )
 
-    # A process of its own is refused before MPI has started.
-    read_before = None if launched_by_mpirun() else read()
+    is_alone = not launched_by_mpirun()
+    if is_alone:  # it is refused before MPI has started
+        what = read()
     comm = console.world()
     if lone := lone_task(comm.size):
         console.warn(lone)
     abort_on_unforeseen_error(comm)
     set_up_logging(comm, verbose, console.is_quiet())
-    what, options = read_before or on_root(comm, read, takes_long=True)
+    if not is_alone:
+        what = on_root(comm, read, takes_long=True)
     table = scene_of(what).petsc.given()
-    arguments = as_arguments(table, options)
-    on_root(comm, lambda: refuse_unwritable(options))
+    arguments = as_arguments(table, petsc)
+    on_root(comm, lambda: refuse_unwritable(petsc))
     start_petsc(arguments)
 
     def warn() -> None:
@@ -363,25 +323,6 @@ def begin(
 
     console.at_end(warn)
     return comm, what, arguments
-
-
-def records_of(folder: Path) -> Records | None:
-    """Content of the result file of a run's folder, None if a quick look is enough.
-
-    Raises
-    ------
-    InputError
-        If there is no such folder.
-    """
-    from catenary.postproc.read.guard import examined
-
-    refuse_no_folder(folder)
-    return examined(folder)
-
-
-def names_in(text: str | None) -> list[str]:
-    """The names of a list with commas, none without it."""
-    return [] if text is None else [name.strip() for name in text.split(",")]
 
 
 def print_findings(text: str, files: Sequence[Path]) -> None:

@@ -17,124 +17,79 @@ from catenary.cases.cli.app import serial_verb
 from catenary.cases.terminal import console
 
 
-@serial_verb(
-    "list",
-    help="List cases, keys, pantographs, rule books or the schema.",
-    epilog="Example: catenary list --keys damping",
-)
+@serial_verb("list")
 def list_cases(
-    keys: Annotated[
-        bool, typer.Option("--keys", help="Every key of a scene, its unit, default and meaning.")
-    ] = False,
-    pantographs: Annotated[
-        bool,
-        typer.Option("--pantographs", help="Ready pantographs, for pantographs.NAME.model."),
-    ] = False,
-    schema: Annotated[
-        bool,
-        typer.Option(
-            "--schema", help="The JSON schema of case.toml, for editors that complete keys."
-        ),
-    ] = False,
-    rules: Annotated[
-        bool,
-        typer.Option("--rules", help="Rule books that judge a run, for evaluation.rules."),
-    ] = False,
-    wanted: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="FILTER",
-            autocompletion=command_words.keys,
-            help="With --keys: a part of a key, or a pattern with * and ?; prints bounds, accepted "
-            "words and typical values too. With --rules: a book, whose criteria and limits are "
-            "printed.",
-        ),
-    ] = None,
+    keys: bool = False,
+    pantographs: bool = False,
+    schema: bool = False,
+    rules: bool = False,
+    wanted: Annotated[str | None, typer.Argument(autocompletion=command_words.keys)] = None,
 ) -> None:
-    """Serial."""
-    given = [
-        name
-        for name, on in (
-            ("--keys", keys),
-            ("--pantographs", pantographs),
-            ("--rules", rules),
-            ("--schema", schema),
-        )
-        if on
-    ]
+    """List cases, keys, pantographs, rule books or the schema.
+
+    Example: catenary list --keys damping
+
+    Parameters
+    ----------
+    keys : Every key of a scene, its unit, default and meaning.
+    pantographs : Ready pantographs, for pantographs.NAME.model.
+    schema : The JSON schema of case.toml, for editors that complete keys.
+    rules : Rule books that judge a run, for evaluation.rules.
+    wanted FILTER : With --keys: a part of a key, or a pattern with * and ?; prints bounds, accepted
+        words and typical values too. With --rules: a book, whose criteria and limits are printed.
+    """
+    asked = {"--keys": keys, "--pantographs": pantographs, "--rules": rules, "--schema": schema}
+    given = [name for name, on in asked.items() if on]
     if len(given) > 1:
         raise InputError(
             "list takes one of --keys, --pantographs, --rules and --schema, not "
             f"{' and '.join(given)}"
         )
-    if rules:
-        from catenary.cases.terminal.lists import book_table, criteria_text
-
-        console.say(book_table() if wanted is None else criteria_text(wanted))
-        return
-    if keys:
-        from catenary.cases.terminal.lists import key_details, key_table
-
-        console.say(key_table() if wanted is None else key_details(wanted))
-        return
-    if wanted is not None:
+    if wanted is not None and not (rules or keys):
         raise InputError(
             f"{wanted} filters keys or names a rule book: write `catenary list --keys {wanted}` or "
             f"`catenary list --rules {wanted}`"
         )
-    if schema:
-        from catenary.cases.terminal.lists import scene_schema
+    from catenary.cases.terminal import lists
 
-        console.say(json.dumps(scene_schema(), indent=1), whole=True)
-        return
-    if pantographs:
-        from catenary.cases.terminal.terminal_text import pantograph_table
+    if rules:
+        text = lists.book_table() if wanted is None else lists.criteria_text(wanted)
+    elif keys:
+        text = lists.key_table() if wanted is None else lists.key_details(wanted)
+    elif schema:
+        text = json.dumps(lists.scene_schema(), indent=1)
+    elif pantographs:
+        text = lists.pantograph_table()
+    else:
+        from catenary.scenes import shipped_cases
 
-        console.say(pantograph_table())
-        return
-    from catenary.cases.terminal import terminal_text
-    from catenary.scenes import shipped_cases
-
-    console.say(terminal_text.case_table(shipped_cases()))
+        text = lists.case_table(shipped_cases())
+    console.say(text, whole=schema)
 
 
-@serial_verb(
-    "new",
-    help="Write a commented case as a beginning of your own. `check` and `run` take the new "
-    "folder NAME with its NAME/case.toml. Without --topology it asks which kind of line, on "
-    "a terminal.",
-    epilog="Example: catenary new my_line --topology stitched --spans spans.csv --droppers "
-    "droppers.csv",
-)
+@serial_verb("new")
 def new(
-    folder: Annotated[
-        Path, typer.Argument(parser=console.folder, metavar="NAME", help="Folder to make.")
-    ],
-    topology: Annotated[
-        str | None,
-        typer.Option(
-            "--topology",
-            help="Kind of line: simple, stitched, compound, twin, twin_messenger, single, tramway, "
-            "conductor_rail, or a case to begin with.",
-            autocompletion=command_words.beginnings,
-        ),
-    ] = None,
-    spans: Annotated[
-        Path | None,
-        typer.Option(
-            "--spans", help="CSV file with the column span_m, a line for each span; is copied."
-        ),
-    ] = None,
-    droppers: Annotated[
-        Path | None,
-        typer.Option(
-            "--droppers",
-            help="CSV file with the columns span, position_m and pre_sag_mm or length_m, a line "
-            "for each dropper; is copied, with the pre-sag that lengths give.",
-        ),
-    ] = None,
+    folder: Annotated[Path, typer.Argument(parser=console.folder)],
+    topology: Annotated[str | None, typer.Option(autocompletion=command_words.beginnings)] = None,
+    spans: Path | None = None,
+    droppers: Path | None = None,
 ) -> None:
-    """Serial."""
+    """Write a commented case as a beginning of your own.
+
+    `check` and `run` take the new folder NAME with its NAME/case.toml. Without --topology it asks
+    which kind of line, on a terminal.
+
+    Example: catenary new my_line --topology stitched --spans spans.csv --droppers droppers.csv
+
+    Parameters
+    ----------
+    folder NAME : Folder to make.
+    topology : Kind of line: simple, stitched, compound, twin, twin_messenger, single, tramway,
+        conductor_rail, or a case to begin with.
+    spans : CSV file with the column span_m, a line for each span; is copied.
+    droppers : CSV file with the columns span, position_m and pre_sag_mm or length_m, a line for
+        each dropper; is copied, with the pre-sag that lengths give.
+    """
     from catenary.cases.scene.starter import BEGINNINGS, write_case
 
     if topology is None and sys.stdin.isatty() and sys.stdout.isatty():
@@ -161,15 +116,15 @@ def new(
     console.say(f"{path} is written; try:\n  {check}\n  {run}")
 
 
-@serial_verb(
-    "doctor",
-    help="Check that Catenary works here. Packages, compiled kernels, PETSc, MPI, HDF5, compiler, "
-    "films, ParaView, file locks, memory: each line says OK, missing or broken, and how to "
-    "mend it; exits with 1 if no run is possible.",
-    epilog="Example: catenary doctor",
-)
+@serial_verb("doctor")
 def doctor() -> int:
-    """Serial."""
+    """Check that Catenary works here.
+
+    Packages, compiled kernels, PETSc, MPI, HDF5, compiler, films, ParaView, file locks, memory:
+    each line says OK, missing or broken, and how to mend it; exits with 1 if no run is possible.
+
+    Example: catenary doctor
+    """
     from catenary.cases.process.installation import examined
 
     if launched_by_mpirun():

@@ -23,11 +23,8 @@ def all_verbs() -> typer.Typer:
     """The application with all verbs."""
     # Each of these files adds its verbs, in this order of --help.
     # isort: off
-    from catenary.cases.cli import preparation, results  # noqa: F401
-    from catenary.cases.cli.studies import variants, questions  # noqa: F401
-    from catenary.cases.cli.studies import verification, parameters  # noqa: F401
-    from catenary.cases.cli.studies import waves  # noqa: F401
-    from catenary.cases.cli import first_steps  # noqa: F401
+    from catenary.cases.cli import preparation, results, variants, questions  # noqa: F401
+    from catenary.cases.cli import verification, responses, first_steps  # noqa: F401
 
     # isort: on
     return application.app

@@ -6,24 +6,14 @@ check, draw, print or write the scene's line.
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
-
-import typer
 
 import catenary
 from catenary.base.errors import InputError
 from catenary.base.parallel import launched_by_mpirun
-from catenary.cases.cli.app import (
-    Force,
-    Jobs,
-    SceneWords,
-    folder_option,
-    names_in,
-    print_findings,
-    serial_verb,
-)
+from catenary.cases.cli.app import print_findings, serial_verb
+from catenary.cases.cli.command_words import Force, Jobs, OutIfAny, SceneWords, names_in
 from catenary.cases.result_folder.output_folder import new_file, refuse_impossible, refuse_table
 from catenary.cases.terminal import console
 from catenary.postproc.evaluate.wording import counted
@@ -35,52 +25,36 @@ _RUNS = "runs"
 _MOST_ROUNDS = 1000
 
 
-@serial_verb(
-    "plan",
-    help="Print what a case simulates and what a run of it needs. With --cost, switch each effect "
-    "in turn, and print the time of a step and the change of results.",
-    epilog="Example: catenary plan ac_simple --set train.speed_km_h=320; "
-    "catenary plan ambrosio2012 --cost --stretch-m 100 -o results/cost",
-)
+@serial_verb("plan")
 def plan(
     words: SceneWords,
-    cost: Annotated[
-        bool,
-        typer.Option(
-            "--cost", help="Measure what each effect costs and changes, on one rank; a minute."
-        ),
-    ] = False,
-    only: Annotated[
-        str | None,
-        typer.Option("--only", metavar="EFFECT,...", help="With --cost: these effects alone."),
-    ] = None,
-    stretch: Annotated[
-        float | None,
-        typer.Option("--stretch-m", help="With --cost: length to evaluate at most; 200 if absent."),
-    ] = None,
-    rounds: Annotated[
-        int | None,
-        typer.Option("--rounds", help="With --cost: how often steps are timed; 10 if absent."),
-    ] = None,
-    tolerance: Annotated[
-        str | None,
-        typer.Option(
-            "--tolerance",
-            metavar="PERCENT",
-            help="With --cost: smaller changes of results do not count; 1% if absent.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        folder_option("With --cost: folder for tables and runs; the same command reuses these."),
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="With --cost: print JSON in place of the table.")
-    ] = False,
+    cost: bool = False,
+    only: str | None = None,
+    stretch_m: float | None = None,
+    rounds: int | None = None,
+    tolerance: str | None = None,
+    out: OutIfAny = None,
+    json: bool = False,
     n_jobs: Jobs = 1,
     force: Force = False,
 ) -> int:
-    """Serial."""
+    """Print what a case simulates and what a run of it needs.
+
+    With --cost, switch each effect in turn, and print the time of a step and the change of results.
+
+    Example: catenary plan ac_simple --set train.speed_km_h=320; catenary plan ambrosio2012 --cost
+    --stretch-m 100 -o results/cost
+
+    Parameters
+    ----------
+    cost : Measure what each effect costs and changes, on one rank; a minute.
+    only EFFECT,... : With --cost: these effects alone.
+    stretch_m : With --cost: length to evaluate at most; 200 if absent.
+    rounds : With --cost: how often steps are timed; 10 if absent.
+    tolerance PERCENT : With --cost: smaller changes of results do not count; 1% if absent.
+    out : With --cost: folder for tables and runs; the same command reuses these.
+    json : With --cost: print JSON in place of the table.
+    """
     if cost:
         from catenary.cases.studies.accuracy.analysis import parse_target
         from catenary.cases.studies.effect_cost import CostOptions
@@ -90,15 +64,15 @@ def plan(
             words.case,
             words.changes,
             words.shortened,
-            200.0 if stretch is None else _within("--stretch-m", stretch, 1.0, 1e7),
+            200.0 if stretch_m is None else _within("--stretch-m", stretch_m, 1.0, 1e7),
             10 if rounds is None else int(_within("--rounds", rounds, 1, _MOST_ROUNDS)),
             wanted,
             names_in(only),
         )
-        return _cost(options, out, as_json, n_jobs, force)
+        return _cost(options, out, json, n_jobs, force)
     belonging = {
-        "--only": only, "--stretch-m": stretch, "--rounds": rounds, "--tolerance": tolerance,
-        "-o": out, "--json": as_json or None, "--force": force or None,
+        "--only": only, "--stretch-m": stretch_m, "--rounds": rounds, "--tolerance": tolerance,
+        "-o": out, "--json": json or None, "--force": force or None,
         "-j": None if n_jobs == 1 else n_jobs,
     }  # fmt: skip
     for option, value in belonging.items():
@@ -116,7 +90,7 @@ def _within(option: str, value: float, low: float, high: float) -> float:
 
 def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, force: bool) -> int:
     """Runs ``--cost``; returns the exit code."""
-    from catenary.callers import temporary_folder
+    from catenary.callers import given_or_temporary
     from catenary.cases.process.petsc_options import as_arguments, start_petsc
     from catenary.cases.scene.load import load_scene
     from catenary.cases.studies.records import held_study
@@ -137,11 +111,11 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
         if not as_json:
             console.say(line)
 
-    with ExitStack() as stack:
-        held = stack.enter_context(held_study(out, comm, f"catenary plan {options.case} --cost"))
-        if out is not None:
-            refuse_table(out / effect_cost.RECORD, force)
-        folder = out or stack.enter_context(temporary_folder(comm, "cost"))
+    with (
+        held_study(out, comm, f"catenary plan {options.case} --cost") as held,
+        given_or_temporary(out, comm, "cost") as folder,
+    ):
+        refuse_table(out, effect_cost.RECORD, force)
         found = effect_cost.measure(options, folder / _RUNS, say, force, n_jobs)
         files = [] if found is None else held.write(lambda: effect_cost.files_of(found))
     if found is None:
@@ -157,16 +131,15 @@ def _cost(options: CostOptions, out: Path | None, as_json: bool, n_jobs: int, fo
     return console.DONE
 
 
-@serial_verb(
-    "check",
-    help="Check a case without running it. It looks at keys, bounds, geometry, effects, mesh, "
-    "pantographs, and whether a dropper is slack at rest; it writes nothing.",
-    epilog="Example: catenary check my_line/case.toml --set line.dropper.pre_sag_mid_mm=60",
-)
-def check(
-    words: SceneWords,
-) -> int:
-    """Serial."""
+@serial_verb("check")
+def check(words: SceneWords) -> int:
+    """Check a case without running it.
+
+    It looks at keys, bounds, geometry, effects, mesh, pantographs, and whether a dropper is slack
+    at rest; it writes nothing.
+
+    Example: catenary check my_line/case.toml --set line.dropper.pre_sag_mid_mm=60
+    """
     from catenary.cases.scene.input.faults import SceneError
 
     try:
@@ -182,26 +155,19 @@ def check(
     return console.DONE
 
 
-@serial_verb(
-    "mesh",
-    help="Write the mesh of a case, or draw its line to scale. The mesh is a Gmsh file; the "
-    "drawing shows the line at rest.",
-    epilog="Example: catenary mesh re330_stitched -o re330.svg",
-)
-def mesh(
-    words: SceneWords,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--out",
-            help="File to write: *.msh is the mesh; *.png and *.svg draw side view, plan view and "
-            "a cross-section.",
-        ),
-    ],
-    force: Force = False,
-) -> None:
-    """Serial."""
+@serial_verb("mesh")
+def mesh(words: SceneWords, out: Annotated[Path, "-o", "--out"], force: Force = False) -> None:
+    """Write the mesh of a case, or draw its line to scale.
+
+    The mesh is a Gmsh file; the drawing shows the line at rest.
+
+    Example: catenary mesh re330_stitched -o re330.svg
+
+    Parameters
+    ----------
+    out : File to write: *.msh is the mesh; *.png and *.svg draw side view, plan view and a
+        cross-section.
+    """
     scene = words.load()
     from catenary.cases.run.scene_mesh import DRAWN, draw_scene, write_mesh_of
 
@@ -213,48 +179,36 @@ def mesh(
     console.say(f"{out}: {made.n_nodes} nodes, {counted(made.droppers.shape[0], 'dropper')}")
 
 
-@serial_verb(
-    "static",
-    help="Print droppers, registration, sag, elasticity at rest.",
-    epilog="Example: catenary static ac_simple -o droppers.csv",
-)
+@serial_verb("static")
 def static(
     words: SceneWords,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--out",
-            help="Also write a file: *.csv holds the dropper table, *.json everything; with "
-            "--temperatures *.png and *.svg draw them.",
-        ),
-    ] = None,
+    out: Annotated[Path | None, "-o", "--out"] = None,
     force: Force = False,
-    registration: Annotated[
-        bool,
-        typer.Option("--registration", help="Write the table of the steady arms as *.csv."),
-    ] = False,
-    over: Annotated[
-        str | None,
-        typer.Option(
-            "--temperatures",
-            metavar="LOW,HIGH",
-            help="Instead print tensions along the section and how far the ends of wires move, "
-            "from LOW to HIGH K above the installation.",
-        ),
-    ] = None,
+    registration: bool = False,
+    temperatures: str | None = None,
 ) -> None:
-    """Serial."""
-    if registration and (out is None or over is not None):
+    """Print droppers, registration, sag, elasticity at rest.
+
+    Example: catenary static ac_simple -o droppers.csv
+
+    Parameters
+    ----------
+    out : Also write a file: *.csv holds the dropper table, *.json everything; with --temperatures
+        *.png and *.svg draw them.
+    registration : Write the table of the steady arms as *.csv.
+    temperatures LOW,HIGH : Instead print tensions along the section and how far the ends of wires
+        move, from LOW to HIGH K above the installation.
+    """
+    if registration and (out is None or temperatures is not None):
         raise InputError("--registration takes -o with the name of a *.csv file to write")
     if out is not None:
         tables = (".csv",) if registration else (".csv", ".json")
-        new_file(out, tables if over is None else (".png", ".svg"), force)
-    if over is not None:
-        from catenary.cases.run.at_rest import range_of, temperatures
+        new_file(out, tables if temperatures is None else (".png", ".svg"), force)
+    if temperatures is not None:
+        from catenary.cases.run import at_rest
 
-        differences = range_of(over)
-        console.say(temperatures(words.load(), differences, out))
+        differences = at_rest.range_of(temperatures)
+        console.say(at_rest.temperatures(words.load(), differences, out))
         return
     rest = catenary.static(words.scene())
     if out is not None:
@@ -264,18 +218,18 @@ def static(
     console.say(str(rest))
 
 
-@serial_verb(
-    "prepare",
-    help="Write a line and its pantographs for steps from outside. A C program, a real-time "
-    "computer or a controller in Python takes these steps.",
-    epilog="Example: catenary prepare en50318_2002 -o en300.line --set train.speed_km_h=300",
-)
-def prepare(
-    words: SceneWords,
-    out: Annotated[Path, typer.Option("-o", "--out", help="File to write: *.line.")],
-    force: Force = False,
-) -> None:
-    """Serial."""
+@serial_verb("prepare")
+def prepare(words: SceneWords, out: Annotated[Path, "-o", "--out"], force: Force = False) -> None:
+    """Write a line and its pantographs for steps from outside.
+
+    A C program, a real-time computer or a controller in Python takes these steps.
+
+    Example: catenary prepare en50318_2002 -o en300.line --set train.speed_km_h=300
+
+    Parameters
+    ----------
+    out : File to write: *.line.
+    """
     path = catenary.prepare(words.scene(), out, force=force)
     from catenary.cases.run.at_rest import HEADER, LIBRARY
 

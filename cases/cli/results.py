@@ -4,78 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from catenary.base.errors import CatenaryError, InputError
 from catenary.base.files import is_file, is_folder
-from catenary.cases.cli.app import Force, RunFolder, folder_option, records_of, serial_verb
+from catenary.cases.cli.app import serial_verb
+from catenary.cases.cli.command_words import Force, OutIfAny, RunFolder, records_of
 from catenary.cases.result_folder.output_folder import refuse_table
 from catenary.cases.terminal import console
 from catenary.postproc.files.own_files import RUN_FILE
-from catenary.postproc.film.options import FilmOptions, View
+from catenary.postproc.film.options import FilmOptions, Motion, View
 
 if TYPE_CHECKING:
     from catenary.mbs.shape import Shape
     from catenary.postproc.read.validation import Records
 
 
-Motion = Annotated[
-    float | None,
-    typer.Option("--motion", min=1, max=1e5, help="Factor by which displacements are enlarged."),
-]
-FromWhere = Annotated[
-    View | None,
-    typer.Option(
-        help="From the side, from the side and above, from above, or from behind the train; "
-        "oblique if absent where wires lie beside each other, side otherwise."
-    ),
-]
-
-
-@serial_verb(
-    "report",
-    help="Write the full report of a run from its result file. It has data sheets, worst places, "
-    "spectra and vector pictures.",
-    epilog="Example: catenary report results/en300 --pdf",
-)
+@serial_verb("report")
 def report(
     folder: RunFolder,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too, on A4.")] = False,
-    interactive: Annotated[
-        bool,
-        typer.Option(
-            "--interactive",
-            help="Write report_interactive.html too: pictures to zoom and read off, 5 MB.",
-        ),
-    ] = False,
-    accuracy: Annotated[
-        Path | None,
-        typer.Option(
-            "--accuracy",
-            metavar="STUDY",
-            help="Folder of `catenary accuracy --axes grid`, whose errors stand beside the limits.",
-        ),
-    ] = None,
-    cost: Annotated[
-        Path | None,
-        typer.Option(
-            "--cost",
-            metavar="STUDY",
-            help="Folder of `catenary plan --cost -o STUDY`, whose costs stand beside the effects.",
-        ),
-    ] = None,
-    validation: Annotated[
-        Path | None,
-        typer.Option(
-            "--validation",
-            metavar="STUDY",
-            help="Folder of `catenary validate -o STUDY`, whose statement is part of the report.",
-        ),
-    ] = None,
+    pdf: bool = False,
+    interactive: bool = False,
+    accuracy: Path | None = None,
+    cost: Path | None = None,
+    validation: Path | None = None,
 ) -> None:
-    """Serial."""
+    """Write the full report of a run from its result file.
+
+    It has data sheets, worst places, spectra and vector pictures.
+
+    Example: catenary report results/en300 --pdf
+
+    Parameters
+    ----------
+    pdf : Write report.pdf too, on A4.
+    interactive : Write report_interactive.html too: pictures to zoom and read off, 5 MB.
+    accuracy STUDY : Folder of `catenary accuracy --axes grid`, whose errors stand beside the
+        limits.
+    cost STUDY : Folder of `catenary plan --cost -o STUDY`, whose costs stand beside the effects.
+    validation STUDY : Folder of `catenary validate -o STUDY`, whose statement is part of the
+        report.
+    """
     records = records_of(folder)
     console.alone()  # starts MPI as one process, before anything imports it
     from catenary.cases.studies.full_report import (
@@ -121,30 +90,30 @@ def report(
     console.say("\n".join(str(path) for path in written.files))
 
 
-@serial_verb(
-    "compare",
-    help="Compare runs with each other or with a measurement. Of several runs it prints the "
-    "figures side by side, with the statistical significance of their differences; of a run "
-    "and a measured passage, errors of the measurement, figures of both, tolerances.",
-    epilog="Example: catenary compare results/coarse results/fine, or with a measurement: "
-    "catenary compare results/en300 measured.csv --description measured.toml -o results/measured",
-)
+@serial_verb("compare")
 def compare(
-    first: Annotated[Path, typer.Argument(help="Folder of a run.")],
-    others: Annotated[
-        list[Path], typer.Argument(help="Folders of other runs, or the CSV file of a measurement.")
-    ],
-    description: Annotated[
-        Path | None,
-        typer.Option(help="TOML file: columns, units, filter and pantograph of the measurement."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        folder_option("Folder for page, tables and JSON of a measurement; none if absent."),
-    ] = None,
+    first: Path,
+    others: list[Path],
+    description: Path | None = None,
+    out: OutIfAny = None,
     force: Force = False,
 ) -> None:
-    """Serial."""
+    """Compare runs with each other or with a measurement.
+
+    Of several runs it prints the figures side by side, with the statistical significance of their
+    differences; of a run and a measured passage, errors of the measurement, figures of both,
+    tolerances.
+
+    Example: catenary compare results/coarse results/fine, or with a measurement: catenary compare
+    results/en300 measured.csv --description measured.toml -o results/measured
+
+    Parameters
+    ----------
+    first : Folder of a run.
+    others : Folders of other runs, or the CSV file of a measurement.
+    description : TOML file: columns, units, filter and pantograph of the measurement.
+    out : Folder for page, tables and JSON of a measurement; none if absent.
+    """
     from catenary.postproc.read.guard import examined
 
     tables = [
@@ -189,8 +158,7 @@ def _compare_measured(
     from catenary.postproc.measurements.comparison import compare_with
     from catenary.postproc.read.results import Results
 
-    if out is not None:
-        refuse_table(out / compared.PAGE, force)
+    refuse_table(out, compared.PAGE, force)
     table = read_table(file)
     if wanted is None:
         wanted = usual_description(table, file)
@@ -202,50 +170,17 @@ def _compare_measured(
         console.say("\n" + "\n".join(map(str, compared.write_comparison(out, found))))
 
 
-@serial_verb(
-    "animate",
-    help="Make a film of a run, film.mp4 and film.gif. It shows the line and its pantographs, the "
-    "contact force beneath, from the snapshots of fields.h5.",
-    epilog="Example: catenary animate results/en300 --from 2 --to 6 --camera trailing",
-)
-def animate(
-    folder: RunFolder,
-    start: Annotated[
-        float | None, typer.Option("--from", min=0, max=1e7, help="Simulated time to begin at [s].")
-    ] = None,
-    end: Annotated[
-        float | None, typer.Option("--to", min=0, max=1e7, help="Simulated time to end at [s].")
-    ] = None,
-    rate: Annotated[float, typer.Option("--fps", min=1, max=120, help="Frames per second.")] = 25.0,
-    every: Annotated[
-        float | None,
-        typer.Option(
-            "--every-m",
-            min=1e-3,
-            max=1e4,
-            help="Travel of the train between two frames; a hundredth of their width if absent.",
-        ),
-    ] = None,
-    width: Annotated[
-        float | None,
-        typer.Option(
-            "--width-m", min=5, max=2000, help="Line in the picture; some two spans if absent."
-        ),
-    ] = None,
-    motion: Motion = None,
-    view: FromWhere = None,
-    camera: Annotated[
-        str | None,
-        typer.Option(
-            help="Pantograph that the camera follows: its name, or its number from the front; "
-            "the middle of all if absent."
-        ),
-    ] = None,
-) -> None:
-    """Serial."""
+@serial_verb("animate")
+def animate(folder: RunFolder, options: FilmOptions) -> None:
+    """Make a film of a run, film.mp4 and film.gif.
+
+    It shows the line and its pantographs, the contact force beneath, from the snapshots of
+    fields.h5.
+
+    Example: catenary animate results/en300 --from 2 --to 6 --camera trailing
+    """
     from catenary.postproc.film.animate import animate as make_film
 
-    options = FilmOptions(start, end, rate, every, width, motion, view, camera)
     records = records_of(folder)
     shapes = _shapes(folder, records)
     film = make_film(folder, options, records, not console.is_quiet(), shapes)
@@ -268,22 +203,24 @@ def animate(
         )
 
 
-@serial_verb(
-    "paraview",
-    help="Write a script that opens a run in ParaView. paraview/view.py in the folder of the run "
-    "shows pantographs, forces and masts, heights and displacements enlarged.",
-    epilog="Example: catenary paraview results/en300",
-)
+@serial_verb("paraview")
 def paraview(
-    folder: RunFolder,
-    motion: Motion = None,
-    view: FromWhere = None,
-    state: Annotated[
-        bool,
-        typer.Option(help="Let ParaView write view.pvsm, which opens the same without Python."),
-    ] = True,
+    folder: RunFolder, motion: Motion = None, view: View | None = None, state: bool = True
 ) -> None:
-    """Serial."""
+    """Write a script that opens a run in ParaView.
+
+    paraview/view.py in the folder of the run shows pantographs, forces and masts, heights and
+    displacements enlarged.
+
+    Example: catenary paraview results/en300
+
+    Parameters
+    ----------
+    motion : Factor by which displacements are enlarged.
+    view : From the side, from the side and above, from above, or from behind the train; oblique if
+        absent where wires lie beside each other, side otherwise.
+    state : Let ParaView write view.pvsm, which opens the same without Python.
+    """
     import shutil
 
     from catenary.postproc.film.open_in_paraview import PROGRAM, write_script, write_state

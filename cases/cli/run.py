@@ -10,22 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from catenary.base.errors import InputError, RunBroken
-from catenary.cases.cli.app import (
-    NamedVariants,
+from catenary.base.options import Bounds
+from catenary.cases.cli.app import begin, crowded, serial_verb, verb
+from catenary.cases.cli.command_words import (
     NoReport,
     Out,
     PartOfRuns,
-    PetscOptions,
     RunFolder,
     RunWords,
     Strict,
     StudyRuns,
-    Vary,
+    VariantWords,
     Verbose,
-    begin,
-    crowded,
-    serial_verb,
-    verb,
 )
 from catenary.cases.result_folder.output_folder import refuse_impossible
 from catenary.cases.terminal import console
@@ -38,29 +34,30 @@ if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
 
 
-@verb(
-    "run",
-    help="Simulate a case and write its results into a folder.",
-    epilog="Example: catenary run en50318_2002 -o results/en300 --set train.speed_km_h=300 "
-    "-- -log_view; catenary run ambrosio2012 --study -o results/study",
-)
+@verb("run")
 def run(
     words: RunWords,
     out: Out,
     strict: Strict = False,
     no_report: NoReport = False,
-    study: Annotated[
-        bool, typer.Option("--study", help="Run the case's study: variants, figures, verdicts.")
-    ] = False,
+    study: bool = False,
     part: PartOfRuns = None,
     *,
     runs: StudyRuns,
 ) -> int:
-    """Collective."""
+    """Simulate a case and write its results into a folder.
+
+    Example: catenary run en50318_2002 -o results/en300 --set train.speed_km_h=300 -- -log_view;
+    catenary run ambrosio2012 --study -o results/study
+
+    Parameters
+    ----------
+    study : Run the case's study: variants, figures, verdicts.
+    """
     from catenary.cases.scene.load import load_scene
 
     if study:
-        from catenary.cases.cli.studies.variants import run_study
+        from catenary.cases.cli.variants import run_study
 
         if strict:
             raise InputError("a study is not judged as a whole: give --study without --strict")
@@ -70,12 +67,11 @@ def run(
     if runs.n_jobs != 1 or part is not None:
         raise InputError("-j and --part belong to --study; mpirun shares a single run among ranks")
 
-    def read() -> tuple[Scene, list[str]]:
-        changes, options = words.split()
+    def read() -> Scene:
         refuse_impossible(out)
-        return load_scene(words.case, changes, words.shortened), options
+        return load_scene(words.case, words.changes, words.shortened)
 
-    comm, scene, arguments = begin(read, runs.verbose, lambda scene: scene)
+    comm, scene, arguments = begin(read, lambda scene: scene, words.petsc, runs.verbose)
     from catenary.cases.run.arrivals import arrival_warnings
     from catenary.runs import run_into
     from catenary.solver.problem.problem import OFF
@@ -101,53 +97,51 @@ def run(
     return _end(made, strict)
 
 
-@verb(
-    "restart",
-    help="Continue an interrupted run, or prolong a finished one. It goes on from the last state "
-    "in the result file of a run that was interrupted, broke or is done.",
-    epilog="Example: catenary restart results/en300; catenary restart results/en300 --until-m 900 "
-    "--evaluate 600:840",
-)
+@verb("restart")
 def restart(
     folder: RunFolder,
-    extras: PetscOptions = None,
-    until_m: Annotated[
-        float | None,
-        typer.Option("--until-m", help="Go on until the leading pantograph is there."),
-    ] = None,
-    evaluate: Annotated[
-        str | None,
-        typer.Option(metavar="FROM:TO", help="With --until-m: the stretch to evaluate [m]."),
-    ] = None,
+    extras: Annotated[list[str] | None, typer.Argument()] = None,
+    until_m: float | None = None,
+    evaluate: str | None = None,
     strict: Strict = False,
     no_report: NoReport = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Continue even without room for all results.")
-    ] = False,
+    force: bool = False,
     verbose: Verbose = False,
 ) -> int:
-    """Collective."""
+    """Continue an interrupted run, or prolong a finished one.
+
+    It goes on from the last state in the result file of a run that was interrupted, broke or is
+    done.
+
+    Example: catenary restart results/en300; catenary restart results/en300 --until-m 900 --evaluate
+    600:840
+
+    Parameters
+    ----------
+    extras -- PETSC_OPTION : Options for PETSc, after --.
+    until_m : Go on until the leading pantograph is there.
+    evaluate FROM:TO : With --until-m: the stretch to evaluate [m].
+    force : Continue even without room for all results.
+    """
     from catenary.cases.process.petsc_options import split_extras
+    from catenary.runs import run_into, scene_to_continue
 
-    def read() -> tuple[Scene, list[str]]:
-        from catenary.runs import scene_to_continue
-
-        more, options = split_extras(extras or [])
-        if more:
-            raise InputError(f"{more[0]} cannot be changed when a run is continued")
-        return scene_to_continue(folder, until_m, evaluate), options
-
-    comm, scene, arguments = begin(read, verbose, lambda scene: scene)
-    from catenary.runs import go_on
+    more, petsc = split_extras(extras or [])
+    if more:
+        raise InputError(f"{more[0]} cannot be changed when a run is continued")
+    comm, scene, arguments = begin(
+        lambda: scene_to_continue(folder, until_m, evaluate), lambda scene: scene, petsc, verbose
+    )
     from catenary.solver.problem.problem import OFF
 
     if (crowd := crowded(comm)) and scene.window.mode == OFF:
         console.warn(crowd)
-    made = go_on(
+    made = run_into(
         folder,
         scene,
         comm,
         arguments,
+        goes_on=True,
         force=force,
         extends=until_m is not None,
         only_summary=no_report,
@@ -182,73 +176,49 @@ def _end(made: catenary.Run, strict: bool) -> int:
     return console.NOT_ACCEPTED if strict and made.passed is False else console.DONE
 
 
-@serial_verb(
-    "submit",
-    help="Hand a run to SLURM, with time and memory from the plan. Jobs that wait continue it "
-    "where a limit of time or a lost node ends one. With --array a sweep or study: a job "
-    "array whose tasks make the runs, and a job that makes the table.",
-    epilog="Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh; "
-    "catenary submit en50318_2002 -o results/speeds --array 10 --vary train.speed_km_h=200,250,300",
-)
+@serial_verb("submit")
 def submit(
     words: RunWords,
     out: Out,
-    ranks: Annotated[
-        int,
-        typer.Option(
-            "--ranks",
-            min=1,
-            max=10**6,
-            help="MPI ranks; with --array those of each task, one run on each.",
-        ),
-    ] = 1,
-    nodes: Annotated[
-        int, typer.Option("--nodes", min=1, max=10**5, help="Number of cluster nodes.")
-    ] = 1,
-    minutes: Annotated[
-        int | None,
-        typer.Option(
-            "--minutes", min=5, max=10**5, help="Limit of a job; from the plan if absent."
-        ),
-    ] = None,
-    chain: Annotated[
-        int,
-        typer.Option(
-            "--chain",
-            min=0,
-            max=1000,
-            help="Jobs that may follow the first, or how often a task may be started again.",
-        ),
-    ] = 9,
-    array: Annotated[
-        int | None,
-        typer.Option("--array", metavar="N", min=1, max=10**5, help="Tasks of a sweep or study."),
-    ] = None,
-    vary: Vary = None,
-    named: NamedVariants = None,
-    study: Annotated[
-        bool, typer.Option("--study", help="With --array: the case's study, not a sweep.")
-    ] = False,
-    directives: Annotated[
-        list[str] | None,
-        typer.Option("--sbatch", metavar="OPTION", help="Option of sbatch; repeatable."),
-    ] = None,
-    before: Annotated[
-        list[str] | None,
-        typer.Option("--before", metavar="LINE", help="Line of shell before the run; repeatable."),
-    ] = None,
-    only_print: Annotated[
-        bool, typer.Option("--print", help="Print the script and submit nothing.")
-    ] = False,
+    ranks: Annotated[int, Bounds(1, 10**6)] = 1,
+    nodes: Annotated[int, Bounds(1, 10**5)] = 1,
+    minutes: Annotated[int | None, Bounds(5, 10**5)] = None,
+    chain: Annotated[int, Bounds(0, 1000)] = 9,
+    array: Annotated[int | None, Bounds(1, 10**5)] = None,
+    *,
+    varied: VariantWords,
+    study: bool = False,
+    sbatch: list[str] | None = None,
+    before: list[str] | None = None,
+    print_: bool = False,
 ) -> None:
-    """Serial."""
+    """Hand a run to SLURM, with time and memory from the plan.
+
+    Jobs that wait continue it where a limit of time or a lost node ends one. With --array a sweep
+    or study: a job array whose tasks make the runs, and a job that makes the table.
+
+    Example: catenary submit en50318_2002 -o results/en300 --ranks 4 --print > job.sh; catenary
+    submit en50318_2002 -o results/speeds --array 10 --vary train.speed_km_h=200,250,300
+
+    Parameters
+    ----------
+    ranks : MPI ranks; with --array those of each task, one run on each.
+    nodes : Number of cluster nodes.
+    minutes : Limit of a job; from the plan if absent.
+    chain : Jobs that may follow the first, or how often a task may be started again.
+    array N : Tasks of a sweep or study.
+    study : With --array: the case's study, not a sweep.
+    sbatch OPTION : Option of sbatch; repeatable.
+    before LINE : Line of shell before the run; repeatable.
+    print_ : Print the script and submit nothing.
+    """
     import shutil
 
     from catenary.cases.run.cluster import SlurmJob, slurm_script
     from catenary.cases.scene.input.case_files import find_case, shipped
 
     refuse_impossible(out)
-    if array is None and (vary or named or study):
+    if array is None and (varied or study):
         raise InputError("--vary, --variants and --study belong to --array")
     chosen, options = words.split()
     # A folder in this place may have the name of a shipped case, as one for its results.
@@ -257,9 +227,7 @@ def submit(
     case_words += ["--short"] if words.shortened else []
     # The folder comes last, so that nothing is taken for a further assignment.
     case_words += [word for value in chosen for word in ("--set", value)]
-    job = SlurmJob(
-        ranks, nodes, minutes, chain, directives or [], before or [], "B:" if array else ""
-    )
+    job = SlurmJob(ranks, nodes, minutes, chain, sbatch or [], before or [], "B:" if array else "")
     if array is None:
         from catenary.cases.run.continuing import refuse_other_scene
         from catenary.cases.scene.load import load_scene
@@ -268,8 +236,8 @@ def submit(
         refuse_other_scene(out / RUN_FILE, scene)
         script = slurm_script(case_words, out, job, *_needs_on(scene, job), options)
     else:
-        script = _array_script(words, case_words, out, job, array, vary, named, study)
-    if only_print:
+        script = _array_script(words, case_words, out, job, array, varied, study)
+    if print_:
         console.print_as_is(script)
         return
     if shutil.which("sbatch") is None:
@@ -315,12 +283,10 @@ def _array_script(
     out: Path,
     job: SlurmJob,
     n_tasks: int,
-    vary: list[str] | None,
-    named: Path | None,
+    varied: VariantWords,
     study: bool,
 ) -> str:
     """The script of a sweep or study whose scenes are all checked."""
-    from catenary.cases.cli.studies.variants import read_variants
     from catenary.cases.run.cluster import array_script
     from catenary.cases.run.needs import total_needs
     from catenary.cases.studies.case_study import make_plan
@@ -328,15 +294,15 @@ def _array_script(
 
     chosen, options = words.split()
     if study:
-        if vary or named:
+        if varied:
             raise InputError("--study has runs of its own; leave --vary and --variants away")
         jobs = make_plan(words.case, chosen, words.shortened).jobs
         verb = ["run", *case_words, "--study"]
     else:
-        variants = read_variants(vary, named)
-        jobs = whole_runs_of(words.draft()[0], variants, out).jobs
-        verb = ["sweep", *case_words, *(word for text in vary or [] for word in ("--vary", text))]
-        verb += [] if named is None else ["--variants", str(named.absolute())]
+        jobs = whole_runs_of(words.draft(), varied.read(), out).jobs
+        given = (word for text in varied.vary or [] for word in ("--vary", text))
+        verb = ["sweep", *case_words, *given]
+        verb += [] if varied.named is None else ["--variants", str(varied.named.absolute())]
     needs = total_needs(each.scene for each in jobs)
     return array_script(verb, out, job, n_tasks, needs, options)
 

@@ -126,12 +126,15 @@ def refuse_impossible(folder: Path) -> None:
         raise InputError(f"{folder} is a file; name a folder for the results")
 
 
-def refuse_table(path: Path, force: bool) -> None:
+def refuse_table(folder: Path | None, name: str, force: bool) -> None:
     """Raise InputError if a file of an earlier study may not be replaced, or not be written.
 
-    Not collective.
+    Not collective. Without a ``folder`` none is.
     """
-    refuse_impossible(path.parent)
+    if folder is None:
+        return
+    refuse_impossible(folder)
+    path = folder / name
     if not force and is_there(path):
         raise InputError(f"{path} is there already; {another_folder()}, or give {force_option()}")
 

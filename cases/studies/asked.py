@@ -7,7 +7,7 @@ from math import ceil, floor, inf, log10
 from typing import TYPE_CHECKING, Annotated
 
 from catenary.base.errors import InputError
-from catenary.base.options import Flag, named
+from catenary.base.options import named
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,16 +21,20 @@ _CLOSEST = 1e-3
 
 @dataclass(frozen=True)
 class Speeds:
-    """Speeds that are marched."""
+    """Speeds that are marched.
 
-    slowest: Annotated[float, Flag("--from", "Lowest speed [km/h].", "KM_H")] = 200.0
-    fastest: Annotated[float, Flag("--to", "Highest speed [km/h].", "KM_H")] = 360.0
-    step: Annotated[
-        float, Flag("--step", "Step of the speeds that are run first [km/h].", "KM_H")
-    ] = 10.0
-    within: Annotated[
-        float, Flag("--within", "Bisect the speed to this accuracy [km/h].", "KM_H")
-    ] = 1.0
+    Parameters
+    ----------
+    slowest KM_H : Lowest speed [km/h].
+    fastest KM_H : Highest speed [km/h].
+    step KM_H : Step of the speeds that are run first [km/h].
+    within KM_H : Bisect the speed to this accuracy [km/h].
+    """
+
+    slowest: Annotated[float, "--from"] = 200.0
+    fastest: Annotated[float, "--to"] = 360.0
+    step: Annotated[float, "--step"] = 10.0
+    within: Annotated[float, "--within"] = 1.0
 
     def first(self) -> list[float]:
         """The even division, both ends in it.
@@ -63,11 +67,18 @@ class Speeds:
 
 @dataclass(frozen=True)
 class Distances:
-    """Distances that are marched."""
+    """Distances that are marched.
 
-    nearest: Annotated[float, Flag("--from", "Shortest distance [m].", "M")] = 31.0
-    farthest: Annotated[float, Flag("--to", "Longest distance [m].", "M")] = 400.0
-    step: Annotated[float, Flag("--step", "Step between distances [m].", "M")] = 1.0
+    Parameters
+    ----------
+    nearest M : Shortest distance [m].
+    farthest M : Longest distance [m].
+    step M : Step between distances [m].
+    """
+
+    nearest: Annotated[float, "--from"] = 31.0
+    farthest: Annotated[float, "--to"] = 400.0
+    step: Annotated[float, "--step"] = 1.0
 
     def values(self) -> list[float]:
         """The distances, ascending.
@@ -92,19 +103,20 @@ class Distances:
 
 @dataclass(frozen=True)
 class Frequencies:
-    """Frequencies of a response, and of the lumped model that is fitted to it."""
+    """Frequencies of a response, and of the lumped model that is fitted to it.
 
-    low: Annotated[float, Flag("--from", "Lowest frequency.", "HZ")] = 0.1
-    high: Annotated[float, Flag("--to", "Highest frequency.", "HZ")] = 25.0
-    n_points: Annotated[int, Flag("--points", "Frequencies between them, geometric.", "N")] = 250
-    fit_low: Annotated[
-        float,
-        Flag(
-            "--fit-from",
-            "Lowest frequency of the fit; below it the response is that of the lift.",
-            "HZ",
-        ),
-    ] = 0.5
+    Parameters
+    ----------
+    low HZ : Lowest frequency.
+    high HZ : Highest frequency.
+    n_points N : Frequencies between them, geometric.
+    fit_low HZ : Lowest frequency of the fit; below it the response is that of the lift.
+    """
+
+    low: Annotated[float, "--from"] = 0.1
+    high: Annotated[float, "--to"] = 25.0
+    n_points: Annotated[int, "--points"] = 250
+    fit_low: Annotated[float, "--fit-from"] = 0.5
 
     def frequencies(self) -> np.ndarray:
         """Those of the table, shape (n_points,) [Hz]."""
@@ -130,24 +142,22 @@ class Frequencies:
 
 @dataclass(frozen=True)
 class Excited:
-    """Settings of an excitation in place of a train; None for that of the scene or of its kind."""
+    """Settings of an excitation in place of a train; None for that of the scene or of its kind.
 
-    force: Annotated[
-        float | None, Flag("--force-N", "Moving force or pulse; the static force if absent.")
-    ] = None
-    frequency: Annotated[
-        float | None, Flag("--frequency-Hz", "Frequency of a moving force; constant if absent.")
-    ] = None
-    at: Annotated[
-        float | None, Flag("--at-m", "Place of a pulse or hammer; mid-line if absent.")
-    ] = None
-    duration: Annotated[
-        float | None,
-        Flag("--duration-s", "Duration of a pulse (0.1 if absent) or hammer (0.02)."),
-    ] = None
-    impulse: Annotated[float | None, Flag("--impulse-Ns", "Impulse of a hammer; 10 if absent.")] = (
-        None
-    )
+    Parameters
+    ----------
+    force : Moving force or pulse; the static force if absent.
+    frequency : Frequency of a moving force; constant if absent.
+    at : Place of a pulse or hammer; mid-line if absent.
+    duration : Duration of a pulse (0.1 if absent) or hammer (0.02).
+    impulse : Impulse of a hammer; 10 if absent.
+    """
+
+    force: Annotated[float | None, "--force-N"] = None
+    frequency: Annotated[float | None, "--frequency-Hz"] = None
+    at: Annotated[float | None, "--at-m"] = None
+    duration: Annotated[float | None, "--duration-s"] = None
+    impulse: Annotated[float | None, "--impulse-Ns"] = None
 
 
 def _refuse_no_range(

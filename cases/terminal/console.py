@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import errno
 import functools
-import inspect
 import logging
 import os
 import sys
@@ -13,13 +11,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, TextIO, get_args, get_origin, get_type_hints
+from typing import Any, TextIO
 
 import typer
-from typer.models import ArgumentInfo
 
 from catenary.base.errors import CatenaryError, InputError
-from catenary.base.options import Flag, command_line
+from catenary.base.options import command_line
 from catenary.base.parallel import NO_MEMORY, launched_by_mpirun, on_root
 from catenary.base.process import alone as alone
 from catenary.base.process import world as world
@@ -29,10 +26,7 @@ from catenary.postproc.files.disk_errors import reason
 
 DONE, BROKEN, BAD_INPUT, NOT_ACCEPTED = 0, 1, 2, 3
 _RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
-# The option that ``guarded`` adds to every verb, and whether the present one has it.
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
-_quiet = False
-_BY_NAME = inspect.Parameter.KEYWORD_ONLY
+_quiet = False  # whether the present verb has this option
 # Calls at the end of the verb that runs, which print what it has left to say.
 _last_words: list[Callable[[], None]] = []
 
@@ -188,16 +182,9 @@ def folder(text: str) -> Path:
 def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
     """A command whose foreseen errors end in a sentence and an exit code, not in a traceback.
 
-    The command returns its exit code, None for 0; it gets the option ``--quiet``. A parameter that
-    is a dataclass stands for the options and arguments that are its fields. Collective if the
-    command is.
+    The command returns its exit code, None for 0; with ``quiet`` it prints nothing but errors.
+    Collective if the command is.
     """
-    signature = inspect.signature(command, eval_str=True)
-    groups: dict[str, tuple[Any, dict[str, inspect.Parameter]]] = {
-        name: (one.annotation, _fields_of(name, one.annotation))
-        for name, one in signature.parameters.items()
-        if dataclasses.is_dataclass(one.annotation)
-    }
 
     @functools.wraps(command)
     def wrapped(*args: Any, quiet: bool = False, **kwargs: Any) -> None:
@@ -208,8 +195,6 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
                 raise InputError("--quiet and --verbose exclude each other; give one of them")
             if kwargs.get("force") and kwargs.get("out", True) is None:
                 raise InputError("--force replaces results in the folder of -o; give both, or none")
-            for name, (group, own) in groups.items():
-                kwargs[name] = group(**{field: kwargs.pop(one.name) for field, one in own.items()})
             with command_line():
                 code = command(*args, **kwargs)
                 for print_last in _last_words:
@@ -232,43 +217,7 @@ def guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         if code:
             raise typer.Exit(code)
 
-    # The command line is made from signature and annotations.
-    parameters: list[inspect.Parameter] = []
-    for name, one in signature.parameters.items():
-        parameters += groups[name][1].values() if name in groups else [one.replace(kind=_BY_NAME)]
-    parameters.append(_parameter("quiet", Quiet, False))
-    parameters.sort(key=_takes_the_rest)
-    wrapped.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
     return wrapped
-
-
-def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
-    return inspect.Parameter(name, _BY_NAME, default=default, annotation=annotation)
-
-
-def _fields_of(name: str, group: Any) -> dict[str, inspect.Parameter]:
-    """The fields of a dataclass as parameters; a ``Flag`` is an option of the group's own."""
-    found = {}
-    for field, hint in get_type_hints(group, include_extras=True).items():
-        default = getattr(group, field, inspect.Parameter.empty)
-        flag = next(iter(getattr(hint, "__metadata__", ())), None)
-        if isinstance(flag, Flag):
-            option = typer.Option(flag.name, help=flag.help, metavar=flag.metavar)
-            own = Annotated[hint.__origin__, option]  # type: ignore[name-defined]
-            found[field] = _parameter(f"{name}_{field}", own, default)
-        else:
-            found[field] = _parameter(field, hint, default)
-    return found
-
-
-def _takes_the_rest(one: inspect.Parameter) -> bool:
-    """Whether a parameter stands for all further arguments, so that it comes behind the others."""
-    marks = getattr(one.annotation, "__metadata__", ())
-    if not any(isinstance(mark, ArgumentInfo) for mark in marks):
-        return False
-    hint = one.annotation.__origin__
-    return list in [get_origin(own) for own in (hint, *get_args(hint))]
 
 
 def serial(command: Callable[..., int | None]) -> Callable[..., int | None]:

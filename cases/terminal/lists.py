@@ -1,11 +1,11 @@
-"""Lists of ``catenary list``: keys of a scene and their JSON schema, rule books, their criteria."""
+"""Lists of ``catenary list``: cases, keys, their JSON schema, pantographs, rule books, criteria."""
 
 from __future__ import annotations
 
 import difflib
 import fnmatch
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from catenary.cases.scene.keys.keys import ANY, kind_of, tables_in
 from catenary.cases.scene.keys.table import OneOrMore
 from catenary.cases.scene.keys.units import USUAL, Usual, unit_of, usual_range
 from catenary.cases.scene.scene import Scene
+from catenary.mbs.lumped import READY, ReadyPantograph
 from catenary.meshgen.topologies.all_topologies import registered
 from catenary.postproc.evaluate.wording import terminal_width
 from catenary.postproc.standards.rule_books import (
@@ -41,6 +42,13 @@ _WORDS = {
     "evaluation.system": list(SYSTEMS),
 }
 _GLOB = "*?["
+# Bounds of a JSON schema.
+_BOUNDS = (
+    ("minimum", "from"),
+    ("exclusiveMinimum", "above"),
+    ("maximum", "to"),
+    ("exclusiveMaximum", "to below"),
+)
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,12 @@ class Key:
         """Unit in brackets, "" where the key has none."""
         unit = unit_of(self.name)
         return f"[{unit}]" if unit else ""
+
+
+def case_table(titles: Mapping[str, str]) -> str:
+    """Names and titles of cases, one line each."""
+    width = max(map(len, titles), default=0)
+    return "\n".join(f"{name:{width}}  {title}" for name, title in titles.items())
 
 
 def keys_of_a_scene() -> list[Key]:
@@ -105,11 +119,8 @@ def _default(field: FieldInfo) -> str:
         return "required"
     if field.default is PydanticUndefined:
         return "empty"
-    if field.default is None or field.default == "":
-        return "-"
-    if isinstance(field.default, bool):
-        return str(field.default).lower()
-    return str(field.default)
+    text = "-" if field.default in (None, "") else str(field.default)
+    return text.lower() if isinstance(field.default, bool) else text
 
 
 def key_table() -> str:
@@ -117,13 +128,9 @@ def key_table() -> str:
     meaning below, which is wider than that."""
     rows, is_shown = [], terminal_width() is not None
     for key in keys_of_a_scene():
-        some = f" ({', '.join(key.kinds)})" if key.kinds else ""
+        meaning = key.meaning + (f" ({', '.join(key.kinds)})" if key.kinds else "")
         about = f"{key.name:52} {key.unit:8} {key.default:12}"
-        rows += (
-            [about.rstrip(), *_folded(f"{key.meaning}{some}")]
-            if is_shown
-            else [f"{about} {key.meaning}{some}"]
-        )
+        rows += [about.rstrip(), *_folded(meaning)] if is_shown else [f"{about} {meaning}"]
     return "\n".join(rows)
 
 
@@ -162,23 +169,15 @@ def _chosen(wanted: str) -> list[Key]:
 def _details(key: Key) -> str:
     head = f"{key.name} {key.unit}".rstrip()
     default = {"required": "required", "-": "may be left out", "empty": "may be left out"}
-    facts = [default.get(key.default, f"default {key.default}")]
-    facts += [text for text in (allowed(key),) if text]
-    if key.kinds:
-        facts.append(f"only of {', '.join(key.kinds)}")
-    lines = [key.meaning, "; ".join(facts)]
+    only = f"only of {', '.join(key.kinds)}" if key.kinds else ""
+    facts = [default.get(key.default, f"default {key.default}"), allowed(key), only]
+    lines = [key.meaning, "; ".join(filter(None, facts))]
     if typical := USUAL.get(key.name, Usual()).words:
         lines.append(f"typical: {typical}")
-    elif usual_range(key.name) is not None:
-        low, high = usual_range(key.name) or (0.0, 0.0)
-        lines.append(f"usual: {low:.12g} to {high:.12g}")
+    elif usual := usual_range(key.name):
+        lines.append(f"usual: {usual[0]:.12g} to {usual[1]:.12g}")
     lines += _about_effect(key.name)
-    wrapped = [
-        textwrap.fill(line, _width(), initial_indent="    ", subsequent_indent="      ")
-        for line in lines
-        if line
-    ]
-    return "\n".join([head, *wrapped])
+    return "\n".join([head, *(part for line in lines for part in _folded(line))])
 
 
 def _about_effect(name: str) -> list[str]:
@@ -197,11 +196,21 @@ def _about_effect(name: str) -> list[str]:
 
 def words_of(key: Key) -> list[str]:
     """The words that a key accepts, none if it takes anything else."""
+    return _words_in(_schema_of(key))
+
+
+def allowed(key: Key) -> str:
+    """Bounds and words that a key accepts."""
+    return _of_schema(_schema_of(key))
+
+
+def _schema_of(key: Key) -> dict[str, Any]:
+    """The JSON schema of a key."""
     if key.name in _WORDS:
-        return _WORDS[key.name]
+        return {"enum": _WORDS[key.name]}
     if key.field is None:
-        return ["true", "false"] if key.name.startswith("effects.") else []
-    return _words_in(TypeAdapter(key.field.rebuild_annotation()).json_schema())
+        return {"type": "boolean"} if key.name.startswith("effects.") else {}
+    return TypeAdapter(key.field.rebuild_annotation()).json_schema()
 
 
 def _words_in(schema: dict[str, Any]) -> list[str]:
@@ -213,45 +222,21 @@ def _words_in(schema: dict[str, Any]) -> list[str]:
     return [str(word) for word in schema.get("enum", only)]
 
 
-def allowed(key: Key) -> str:
-    """Bounds and words that a key accepts."""
-    words = words_of(key)
-    if words:
-        return " or ".join(words) if words == ["true", "false"] else f"one of {', '.join(words)}"
-    if key.field is None:
-        return ""
-    return _of_schema(TypeAdapter(key.field.rebuild_annotation()).json_schema())
-
-
 def _of_schema(schema: dict[str, Any]) -> str:
     """Allowed values of a JSON schema in words."""
     if "anyOf" in schema:
         options = [_of_schema(one) for one in schema["anyOf"] if one.get("type") != "null"]
         return " or ".join(dict.fromkeys(text for text in options if text))
-    words = _words_in(schema)
-    if words:
-        return f"one of {', '.join(words)}"
+    if words := _words_in(schema):
+        return "true or false" if words == ["true", "false"] else f"one of {', '.join(words)}"
     kind = schema.get("type")
     if kind in ("number", "integer"):
         noun = "whole number" if kind == "integer" else "number"
-        return f"{noun}{_range(schema)}"
+        bounds = [f"{word} {schema[name]:.12g}" for name, word in _BOUNDS if name in schema]
+        return " ".join([noun, *bounds])
     if kind == "array":
         return _list(schema)
     return {"string": "text", "object": "table"}.get(str(kind), "")
-
-
-def _range(schema: dict[str, Any]) -> str:
-    parts = [
-        f"{word} {schema[name]:.12g}"
-        for name, word in (
-            ("minimum", "from"),
-            ("exclusiveMinimum", "above"),
-            ("maximum", "to"),
-            ("exclusiveMaximum", "to below"),
-        )
-        if name in schema
-    ]
-    return f" {' '.join(parts)}" if parts else ""
 
 
 def _list(schema: dict[str, Any]) -> str:
@@ -372,3 +357,37 @@ class _AsWritten(GenerateJsonSchema):
         if function.__name__ == "_year":
             return {"anyOf": [{"type": "integer"}, made]}
         return made
+
+
+def pantograph_table() -> str:
+    """Name, chain, forces and source of each ready pantograph, a few lines each."""
+    lines = []
+    for name, ready in READY.items():
+        chain = ready.chain
+        lines += [
+            name,
+            f"  {_numbers(chain.masses)} kg, head first; {_numbers(chain.stiffnesses)} N/m and "
+            f"{_numbers(chain.dampings)} N s/m below",
+            f"  {_force(ready)}",
+            f"  {ready.source}",
+        ]
+    return "\n".join(lines)
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
+
+def _signed(value: float) -> str:
+    return f" {'-' if value < 0 else '+'} {abs(value):g}"
+
+
+def _force(ready: ReadyPantograph) -> str:
+    if ready.static_force is None:
+        return "no force of its own: static_force_N or static_force_by_speed is needed"
+    text = f"{ready.static_force:g} N"
+    if any(ready.uplift):
+        a, b, c = ready.uplift
+        terms = f"{a:g} v^2{_signed(b)} v{_signed(c)} N"
+        text += f" + {terms} for v in km/h, never below {ready.static_force:g} N"
+    return text

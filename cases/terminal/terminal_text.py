@@ -1,14 +1,16 @@
-"""Text of the verbs for the terminal: tables and sentences, no measurement and no decision."""
+"""Text of the verbs for the terminal: tables and sentences, and a bar of runs; no decision."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import logging
+import shutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
-from catenary.mbs.lumped import READY, ReadyPantograph
 from catenary.meshgen.line import Line
 from catenary.meshgen.wires import Role, Wire
 from catenary.postproc.evaluate.wording import (
@@ -21,11 +23,8 @@ from catenary.postproc.evaluate.wording import (
 )
 from catenary.postproc.read.registration import Registration
 
-
-def case_table(titles: Mapping[str, str]) -> str:
-    """Names and titles of cases, one line each."""
-    width = max(map(len, titles), default=0)
-    return "\n".join(f"{name:{width}}  {title}" for name, title in titles.items())
+# A run shows its own progress if this logger takes messages; several at once share a bar.
+_logger = logging.getLogger("catenary.progress")
 
 
 def summary_text(
@@ -308,35 +307,56 @@ def _wire_text(wire: Wire, lengths: np.ndarray | None) -> str:
     return text
 
 
-def pantograph_table() -> str:
-    """Name, chain, forces and source of each ready pantograph, a few lines each."""
-    lines = []
-    for name, ready in READY.items():
-        chain = ready.chain
-        lines += [
-            name,
-            f"  {_numbers(chain.masses)} kg, head first; {_numbers(chain.stiffnesses)} N/m and "
-            f"{_numbers(chain.dampings)} N s/m below",
-            f"  {_force(ready)}",
-            f"  {ready.source}",
-        ]
-    return "\n".join(lines)
+class RunsBar:
+    """Shows how many runs have ended and how long the others will take, if somebody looks on.
 
+    A context manager. Not collective.
 
-def _numbers(values: Sequence[float]) -> str:
-    return ", ".join(f"{value:g}" for value in values)
+    Parameters
+    ----------
+    n_runs : how many there are; 0 shows nothing
+    say : writes a line
+    stream : where to, standard error if not given
+    what : what is counted
+    """
 
+    def __init__(
+        self,
+        n_runs: int,
+        say: Callable[[str], None],
+        stream: TextIO | None = None,
+        what: str = "runs",
+    ) -> None:
+        stream = sys.stderr if stream is None else stream
+        self._say = say
+        self._bar: Any = None
+        if n_runs and stream.isatty() and _logger.isEnabledFor(logging.INFO):
+            from tqdm import tqdm  # not loaded where nobody looks on
 
-def _signed(value: float) -> str:
-    return f" {'-' if value < 0 else '+'} {abs(value):g}"
+            self._bar = tqdm(
+                total=n_runs,
+                file=stream,
+                leave=False,
+                ncols=min(shutil.get_terminal_size().columns, 100),
+                bar_format=what + " {percentage:3.0f}% |{bar}| {n} of {total}, left {remaining}",
+            )
 
+    def say(self, line: str) -> None:
+        """Write a line above the bar."""
+        if self._bar is not None:
+            self._bar.clear()
+        self._say(line)
+        if self._bar is not None:
+            self._bar.refresh()
 
-def _force(ready: ReadyPantograph) -> str:
-    if ready.static_force is None:
-        return "no force of its own: static_force_N or static_force_by_speed is needed"
-    text = f"{ready.static_force:g} N"
-    if any(ready.uplift):
-        a, b, c = ready.uplift
-        terms = f"{a:g} v^2{_signed(b)} v{_signed(c)} N"
-        text += f" + {terms} for v in km/h, never below {ready.static_force:g} N"
-    return text
+    def ended(self, n_runs: int = 1) -> None:
+        """Count further runs, one if no number is given."""
+        if self._bar is not None:
+            self._bar.update(n_runs)
+
+    def __enter__(self) -> RunsBar:
+        return self
+
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
+        if self._bar is not None:
+            self._bar.close()

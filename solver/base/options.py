@@ -22,26 +22,20 @@ def option(flag: str, argument: str) -> str:
     return flag if _on_command_line else argument
 
 
-class Flag(NamedTuple):
-    """An option of the command line, as the annotation of a field that is also one of Python.
+class Bounds(NamedTuple):
+    """Least and greatest value of an option of the command line."""
 
-    Attributes
-    ----------
-    name : with its dashes
-    help : its line
-    metavar : what stands there for a value, None for its type
-    """
-
-    name: str
-    help: str
-    metavar: str | None = None
+    least: float
+    most: float
 
 
 def flag_of(group: type, field: str) -> str:
-    """The option of the command line that a field of a dataclass is. Not collective."""
-    (flag,) = get_type_hints(group, include_extras=True)[field].__metadata__
-    name: str = flag.name
-    return name
+    """The option of the command line that a field of a dataclass is. Not collective.
+
+    It is a text in the annotation, ``Annotated[float, "--from"]``.
+    """
+    flag: str = get_type_hints(group, include_extras=True)[field].__metadata__[0]
+    return flag
 
 
 def named(asked: Any, field: str) -> str:

@@ -69,7 +69,7 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
         return told.result
 
     module = types.ModuleType("catenary.cases.run.runner")
-    module.run_case = run_case  # type: ignore[attr-defined]
+    module.run_case = module.restart_case = run_case  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "catenary.cases.run.runner", module)
     monkeypatch.setattr("catenary.cases.process.petsc_options.start_petsc", lambda arguments: None)
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)

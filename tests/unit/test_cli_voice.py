@@ -23,6 +23,13 @@ def test_every_verb_can_be_quiet() -> None:
         assert any("--quiet" in option.opts for option in verb.params), name
 
 
+def test_every_option_has_a_line_of_help() -> None:
+    command: Any = typer.main.get_command(app)
+    for name, verb in command.commands.items():
+        assert verb.epilog.startswith("Example: "), name
+        assert [option.name for option in verb.params if not option.help] == [], name
+
+
 def test_quiet_says_nothing_but_errors() -> None:
     assert invoke("list").stdout
     done = invoke("list", "--quiet")

@@ -22,7 +22,7 @@ from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import table_of
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import parse_vary, product
-from catenary.cases.terminal.runs_bar import RunsBar
+from catenary.cases.terminal.terminal_text import RunsBar
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
 

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from verb_runner import invoke
 
-from catenary.cases.cli.command_words import each_varied
+from catenary.cases.cli.app import each_varied
 
 CASE = "en50318_2002"
 SPEEDS, LAWS = "train.speed_km_h=200,250", "contact.stiffness_N_per_m=2e4,5e4"

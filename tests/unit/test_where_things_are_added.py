@@ -6,7 +6,7 @@ A channel is added in `test_one_more_channel`, unknowns and a load in `test_late
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -16,7 +16,8 @@ from small_lines import HANGING, en50318_line, mesh_of, problem_of, train
 from verb_runner import invoke
 
 from catenary import InputError
-from catenary.cases.cli.app import Force, RunWords, SceneWords, app
+from catenary.cases.cli.app import app, serial_verb, verb
+from catenary.cases.cli.command_words import Force, RunWords, SceneWords
 from catenary.cases.terminal import console
 from catenary.meshgen.mesh import CONTACT_WIRE, MESSENGER_WIRE
 from catenary.meshgen.topologies.all_topologies import make_line
@@ -116,16 +117,53 @@ def test_an_effect_that_contributes_nothing_is_refused() -> None:
 
 
 def test_a_verb_is_a_command_of_the_application() -> None:
-    @app.command("hello", help="A verb of a test.")
-    def hello() -> None:
-        console.say("a verb")
+    """Its docstring is its help, which names no parameter that is not there."""
+
+    @verb("hello")
+    def hello(name: str, loud: bool = False, most_N: float = 1.0) -> None:
+        """A verb of a test.
+
+        Example: catenary hello you
+
+        Parameters
+        ----------
+        name WHO : Name of the one
+            who is greeted.
+        loud : Whether all hear it.
+        """
+        console.say(f"hello {name} {loud} {most_N}")
 
     try:
-        assert "hello" in invoke("--help").stdout
-        assert invoke("hello").stdout == "a verb\n"
+        assert "hello A verb of a test." in " ".join(invoke("--help").stdout.split())
+        assert invoke("hello", "you", "--loud", "--most-N", "2").stdout == "hello you True 2.0\n"
+        told = " ".join(invoke("hello", "--help").stdout.split())
+        assert "Name of the one who is greeted." in told and "hello [OPTIONS] {WHO}" in told
+        assert "--loud Whether all hear it." in told and "Example: catenary hello you" in told
     finally:
         app.registered_commands.pop()
     assert "hello" not in invoke("--help").stdout
+    hello.__doc__ = f"{hello.__doc__}quiet_one : Not there."
+    with pytest.raises(ValueError, match="hello has no parameter quiet_one"):
+        verb("hello")(hello)
+
+    def bye(words: Misdescribed) -> None:
+        """Another one."""
+
+    with pytest.raises(ValueError, match="Misdescribed has no field loud"):
+        verb("bye")(bye)
+
+
+@dataclass
+class Misdescribed:
+    """Words of a verb.
+
+    Parameters
+    ----------
+    name : Name of the one who is greeted.
+    loud : Whether all hear it.
+    """
+
+    name: str
 
 
 CASE, SPEED = "en50318_2002", "train.speed_km_h"
@@ -134,18 +172,17 @@ CASE, SPEED = "en50318_2002", "train.speed_km_h"
 def test_a_study_is_a_verb_with_a_scene_and_a_table() -> None:
     """As CONTRIBUTING has it: options of the scene from one parameter, rows shown by a table."""
 
-    @app.command("speeds", help="Speeds of trains.")
-    @console.guarded
-    @console.serial
+    @serial_verb("speeds")
     def speeds(words: SceneWords, force: Force = False) -> None:
+        """Speeds of trains."""
         scene = words.load("numerics.dt_s=0.002")
         rows = [{"speed": scene.train.speed_km_h, "dt_s": scene.numerics.dt_s, "force": force}]
         columns = [Column("speed", "v [km/h]", ".1f"), Column("dt_s", "dt", "g"), Column("force")]
         console.say(StudyTable(columns, rows).text())
 
-    @app.command("split", help="Options for PETSc.")
-    @console.guarded
+    @verb("split")
     def split(words: RunWords) -> None:
+        """Options for PETSc."""
         console.say(f"{words.case} {words.split()} {words.shortened}")
 
     def said(*words: str) -> list[str]:

@@ -16,8 +16,7 @@ from catenary.base.errors import InputError
 from catenary.cases.run.at_rest import sound_rest
 from catenary.cases.scene.scene import Scene, problem_of
 from catenary.cases.studies.parameters.parameters import ChangedScenes, Parameter, parameters_of
-from catenary.cases.terminal.runs_bar import RunsBar
-from catenary.cases.terminal.terminal_text import elasticity_text
+from catenary.cases.terminal.terminal_text import RunsBar, elasticity_text
 from catenary.meshgen.wires import Role
 from catenary.postproc.evaluate import filters, statistics
 from catenary.postproc.evaluate.statistics import ForceDerivatives, covers

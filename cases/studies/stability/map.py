@@ -31,7 +31,7 @@ from catenary.cases.studies.stability.coupling_schemes import (
     STEPS,
     Bench,
 )
-from catenary.cases.terminal.runs_bar import RunsBar
+from catenary.cases.terminal.terminal_text import RunsBar
 from catenary.mbs.lumped import LumpedData
 from catenary.postproc.report.pictures import figures
 from catenary.solver.contact.contact_wire import ContactWires

@@ -35,7 +35,7 @@ from catenary.cases.run.runner import run_case
 from catenary.cases.scene.scene import resolved
 from catenary.cases.studies.records import is_whole, read_record, read_table, write_record
 from catenary.cases.studies.sweep.jobs import AS_USUAL, Ended, Job, RunOptions
-from catenary.cases.terminal.runs_bar import RunsBar
+from catenary.cases.terminal.terminal_text import RunsBar
 from catenary.postproc.evaluate.wording import duration, fixed
 from catenary.postproc.files.disk import plain
 from catenary.postproc.files.own_files import RUN_FILE

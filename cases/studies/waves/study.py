@@ -162,7 +162,7 @@ def study_excited(
     problem = problem_of(scene)
     excitation = excitation_of(kind, settings, problem, problem.numerics.dt)
     refuse_earlier(folder, force)
-    refuse_table(folder / TABLE, force)
+    refuse_table(folder, TABLE, force)
     moves = isinstance(excitation, MovingForce)
     every = SNAPSHOT_EVERY if moves else BLOW_EVERY
     found: list[tuple[LineAtRest, WireMotion, EnergyMotion]] = []
@@ -194,7 +194,7 @@ def study_obstacles(scene: Scene, folder: Path, force: bool) -> tuple[str, list[
         If the folder holds such a table and ``force`` is not given, or if a wire is carried by its
         bending.
     """
-    refuse_table(folder / OBSTACLES, force)
+    refuse_table(folder, OBSTACLES, force)
     problem = problem_of(scene)
     for wire in problem.line.wires:
         if bends(slowest_wave_of(problem.line, wire), wire.tension, wire.mass_per_length):

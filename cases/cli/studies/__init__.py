@@ -1,1 +1,0 @@
-"""Verbs that run many simulations, or study the line itself."""
