@@ -79,8 +79,8 @@ def _filtered(results: Results) -> list[tuple[str, np.ndarray, np.ndarray]]:
 @figures.own_style()
 def _forces(folders: Folders) -> StudyFigure:
     trains = list(dict.fromkeys(train for own in folders.values() for train in own))
-    figure = figures.new_figure(0.6 + 1.55 * len(trains))
-    grid = figure.subplots(len(trains), 2, sharey=True, squeeze=False)
+    n = len(trains)
+    figure, grid = figures.panels(0.6 + 1.55 * n, n, 2, sharey=True, squeeze=False)
     columns: Columns = {}
     for column, (damping, own) in enumerate(folders.items()):
         for row, train in enumerate(trains):
@@ -107,8 +107,7 @@ def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Co
 @figures.own_style()
 def _overview(rows: Rows) -> StudyFigure:
     """Figure 9: statistics of all pantographs, a panel for each damping."""
-    figure = figures.new_figure(6.4)
-    panels = figure.subplots(2, 1)
+    figure, panels = figures.panels(6.4, 2, 1)
     columns: Columns = {"damping": [], "pantograph": []}
     columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}
     for axes, damping in zip(panels, _PANELS, strict=True):
@@ -133,8 +132,7 @@ def _overview(rows: Rows) -> StudyFigure:
 @figures.own_style()
 def _histograms(folders: Folders) -> StudyFigure:
     """Figure 10: share of time in bins of the contact force, a panel for each damping."""
-    figure = figures.new_figure(6.4)
-    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    figure, panels = figures.panels(6.4, 2, 1, sharex=True, sharey=True)
     columns: Columns = {}
     for axes, (damping, trains) in zip(panels, folders.items(), strict=True):
         for number, (train, folder) in enumerate(trains.items()):
@@ -191,8 +189,7 @@ def _passages(
     caption: str,
 ) -> StudyFigure:
     """A record at one place of the line over the time since the leading head passed it."""
-    figure = figures.new_figure(5.6)
-    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    figure, panels = figures.panels(5.6, 2, 1, sharex=True, sharey=True)
     columns: Columns = {}
     for axes, (damping, trains) in zip(panels, shown.items(), strict=True):
         for number, (train, folder) in enumerate(trains.items()):
@@ -220,8 +217,7 @@ def _passages(
 @figures.own_style()
 def _by_separation(number: int, damping: str, rows: Rows) -> StudyFigure:
     """Figures 13 and 14: statistics over the separation beside the single pantograph's."""
-    figure = figures.new_figure(3.6)
-    panels = figure.subplots(1, 2, sharey=True)
+    figure, panels = figures.panels(3.6, 1, 2, sharey=True)
     own = [row for row in rows.rows if row["damping"] == damping]
     columns: Columns = {"pantograph": [], "train": []}
     columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}

@@ -241,8 +241,7 @@ def advices(found: Measured, target: float) -> list[str]:
 @figures.own_style()
 def draw(found: Measured) -> Figure:
     """Error of the force history over the time of the march, with the Pareto front."""
-    figure = figures.new_figure(4.8)
-    axes = figure.subplots()
+    figure, axes = figures.panels(4.8)
     fronts = []
     for number, axis in enumerate(_precise(found)):
         rows = [row for row in found.rows_of(axis.name) if row.done and row.percent[HISTORY] > 0]

@@ -378,8 +378,7 @@ def draw(study: SpeedStudy) -> Figure | None:
     rows = [row for row in table_of(study.ended).rows if row["outcome"] == "done"]
     if len({row[KEY] for row in rows}) < 2:
         return None
-    figure = figures.new_figure(0.6 + 2.0 * len(_PANELS))
-    panels = figure.subplots(len(_PANELS), 1, sharex=True)
+    figure, panels = figures.panels(0.6 + 2.0 * len(_PANELS), len(_PANELS), 1, sharex=True)
     names = list(dict.fromkeys(row["pantograph"] for row in rows))
     looks = dict(zip(study.directions, ("-", ":"), strict=False))
     for (statistic, criterion), axes in zip(_PANELS, panels, strict=True):

@@ -379,6 +379,5 @@ def draw(study: SeparationStudy, period: Period) -> Figure | None:
             for n in range(1, int(x[-1] / period.ringing[0]) + 1):
                 low, high = np.clip(n * period.ringing, x[0], x[-1])
                 axes.axvspan(low, high, color=figures.SHADE, zorder=0)
-        figures.tidy(axes, "distance [m]; shaded: whole periods of the ringing", label)
-        figures.legend_above(axes)
+        figures.tidy(axes, "distance [m]; shaded: whole periods of the ringing", label, legend=8)
     return figure

@@ -358,8 +358,7 @@ _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
 @figures.own_style()
 def draw(found: StabilityMap) -> Figure:
     """Largest step over contact stiffness and over head mass, both logarithmic."""
-    figure = figures.new_figure(5.6)
-    left, right = figure.subplots(1, 2, sharey=True)
+    figure, (left, right) = figures.panels(5.6, 1, 2, sharey=True)
     masses, stiffnesses = found.grid.few_masses, found.grid.few_stiffnesses
     by_mass = [(f"head {mass:g} kg", {"head_mass": mass}) for mass in masses]
     by_stiffness = [(f"contact {_power(k)} N/m", {"stiffness": k}) for k in stiffnesses]

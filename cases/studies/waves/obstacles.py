@@ -349,8 +349,9 @@ _MARKS = "o^svxD"
 @figures.own_style()
 def picture(results: list[Result]) -> Figure:
     """Sizes of the shares over frequency: theory as lines, what is measured as marks."""
-    figure = figures.new_figure(2.0 + 2.4 * ((len(results) + 1) // 2))
-    panels = figure.subplots((len(results) + 1) // 2, 2, squeeze=False).ravel()
+    n_rows = (len(results) + 1) // 2
+    figure, grid = figures.panels(2.0 + 2.4 * n_rows, n_rows, 2, squeeze=False)
+    panels = grid.ravel()
     for result, axes in zip(results, panels, strict=False):
         for number, (label, shares) in enumerate(_curves(result)):
             # Marks tell curves apart in black and white, too.

@@ -195,8 +195,7 @@ def draw_reflections(
     found: list[EndReflection], ends: tuple[EndCondition, EndCondition], speed: float
 ) -> Figure:
     """Reflection by both ends over frequency; waves faster than ``speed`` [m/s] are filled."""
-    figure = figures.new_figure(4.2)
-    axes = figure.add_subplot()
+    figure, axes = figures.panels(4.2)
     for number, (side, end, kind) in enumerate(zip(SIDES, found, ends, strict=False)):
         frequency = np.broadcast_to(end.frequency[:, None], end.reflected.shape)
         there = np.isfinite(end.reflected)
@@ -226,8 +225,9 @@ def draw_reflections(
     axes.set_yscale("log")
     axes.set_xlim(0.0, HIGHEST)
     axes.set_ylim(0.7 * _LEAST, 2.0)
-    figures.tidy(axes, "frequency [Hz]", f"reflected amplitude [-], drawn from {_LEAST:g}")
-    figures.legend_above(axes, 2)
+    figures.tidy(
+        axes, "frequency [Hz]", f"reflected amplitude [-], drawn from {_LEAST:g}", legend=2
+    )
     return figure
 
 

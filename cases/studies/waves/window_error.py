@@ -144,8 +144,7 @@ def files_of(curves: Sequence[Curve]) -> dict[str, Content]:
 @figures.own_style()
 def draw(curves: Sequence[Curve]) -> Figure:
     """Errors over size; the window that the program chooses is a star, its estimates are dotted."""
-    figure = figures.new_figure(4.6)
-    axes = figure.add_subplot()
+    figure, axes = figures.panels(4.6)
     for number, curve in enumerate(curves):
         spans = [one.spans for one in curve.errors]
         history = [one.history for one in curve.errors]
@@ -159,8 +158,7 @@ def draw(curves: Sequence[Curve]) -> Figure:
                 figures.curve(axes, one.spans, one.history, number, None, "*", ms=13.0)
     axes.set_yscale("log")
     label = "spans that move (star: chosen by the program, dotted: its estimate)"
-    figures.tidy(axes, label, "error of the force [% of sigma]")
-    figures.legend_above(axes, 2)
+    figures.tidy(axes, label, "error of the force [% of sigma]", legend=2)
     return figure
 
 

@@ -122,6 +122,22 @@ def new_figure(height: float) -> Figure:
     return figure
 
 
+def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[Figure, Any]:
+    """A figure as of ``new_figure`` and its panels, as ``Figure.subplots`` gives them for ``how``.
+
+    Parameters
+    ----------
+    height : float
+        Height of the figure [inch].
+    rows, columns : int, optional
+        Number of panels one below the other and side by side.
+    **how : dict
+        Further arguments of Matplotlib's ``subplots``.
+    """
+    figure = new_figure(height)
+    return figure, figure.subplots(rows, columns, **how)
+
+
 def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, list[Axes]]:
     """A figure of the report's width with ``n`` panels one below the other, and the panels.
 
@@ -230,7 +246,7 @@ def uprights(axes: Axes, x: np.ndarray, low: Any, high: Any, **how: Any) -> None
     axes.plot(np.repeat(x, 3), np.stack(ends, axis=1).ravel(), solid_capstyle="butt", **how)
 
 
-def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
+def tidy(axes: Axes, x_label: str, y_label: str, title: str = "", legend: int = 0) -> None:
     """Give a panel labels, a light grid, few ticks and no box.
 
     Parameters
@@ -241,6 +257,8 @@ def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
         Quantity of each axis, with its unit in brackets.
     title : str, optional
         Title above the panel, at its left.
+    legend : int, optional
+        Entries side by side, at most, of a legend above the panel; none if 0.
     """
     for axis, most in zip((axes.xaxis, axes.yaxis), _MOST_TICKS, strict=True):
         if isinstance(axis.get_major_locator(), AutoLocator):
@@ -253,6 +271,8 @@ def tidy(axes: Axes, x_label: str, y_label: str, title: str = "") -> None:
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
+    if legend:
+        legend_above(axes, legend)
 
 
 def wrapped(label: str, width: int = 22) -> str:
