@@ -139,7 +139,6 @@ class StudyTable:
     title: str = ""
     note: str = ""
 
-
     def records(self) -> list[dict[str, Any]]:
         """The rows as files have them."""
         names = [column.name for column in self.columns if column.in_files]

@@ -59,23 +59,17 @@ def files_of(found: Measured, target: float) -> dict[str, Content]:
 def table_of(rows: Sequence[Row], axis: Axis | None = None) -> StudyTable:
     """Table of rows: those of one ``axis``, for people, or without it those of all axes, for
     files."""
-    shown: dict[str, str] = {}
-    if axis is not None:
-        shown = {f"error_{name}_percent": name for name in QUANTITIES}
-        if any(row.by_step for row in rows):
-            shown |= {
-                f"error_{HISTORY}_by_{part}_percent": f"{HISTORY} by {part}"
-                for part in ("step", "mesh")
-            }
-        shown |= {"estimate_over_true": "est/true", "rounds_per_step": "solves"}
-        shown |= {"march_s_per_s": "s/s", "n_remarks": "remarks"}
-    files = [name for name in _figures_of(Row("", "", "done")) if name not in _FOR_PEOPLE]
-    for_people = [Column("setting", axis.name if axis else "", in_files=False)]
-    for_people += [
-        Column(name, head, "d" if name == "n_remarks" else ".3g", in_files=False)
-        for name, head in shown.items()
-    ]
-    return StudyTable([*map(Column, files), *for_people], [_figures_of(row, axis) for row in rows])
+    figures_of = [_figures_of(row, axis) for row in rows]
+    if axis is None:
+        names = [name for name in _figures_of(Row("", "", "done")) if name not in _FOR_PEOPLE]
+        return StudyTable([*map(Column, names)], figures_of)
+    shown = {f"error_{name}_percent": name for name in QUANTITIES}
+    for part in ("step", "mesh") if any(row.by_step for row in rows) else ():
+        shown[f"error_{HISTORY}_by_{part}_percent"] = f"{HISTORY} by {part}"
+    shown |= {"estimate_over_true": "est/true", "rounds_per_step": "solves", "march_s_per_s": "s/s"}
+    columns = [Column("setting", axis.name)]
+    columns += [Column(name, head, ".3g") for name, head in shown.items()]
+    return StudyTable([*columns, Column("n_remarks", "remarks", "d")], figures_of)
 
 
 _FOR_PEOPLE = ("setting", "estimate_over_true", "n_remarks")

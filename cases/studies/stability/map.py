@@ -33,6 +33,7 @@ from catenary.cases.studies.stability.coupling_schemes import (
 )
 from catenary.cases.terminal.runs_bar import RunsBar
 from catenary.mbs.lumped_data import LumpedData
+from catenary.postproc.files.disk import plain
 from catenary.postproc.report.pictures import figures
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
@@ -42,34 +43,17 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 
 # A linear problem: one contact that neither parts nor damps, taut droppers, steps as tried.
 _LINEAR = (
-    "numerics.iterations=",
-    "numerics.adaptive_tolerance_N=",
-    "numerics.smallest_dt_s=",
-    "numerics.eps_d_m=",
-    "numerics.eps_v_m_per_s=",
-    "numerics.eps_force_N=",
-    "numerics.max_iterations=",
-    "window.mode=off",
-    "window.tolerance=",
-    "window.spans_ahead=",
-    "window.spans_behind=",
-    "numerics.coupling=",
-    "numerics.scheme=one_solve",
-    "contact.restitution=",
-    "contact.hertz_stiffness_N_per_m1_5=",
-    "contact.damping_N_s_per_m=",
-    "contact.least_impact_speed_m_per_s=",
-    "contact.law=linear",
-    "effects.contact_damping=false",
-    "effects.contact_loss=false",
-    "effects.residual_dropper_stiffness=false",
-    "effects.dropper_slackening=false",
-    "effects.uplift_stops=false",
-    "effects.pantograph_laws=false",
-    "effects.regulated_lift=false",
-    "effects.gusts=false",
+    "numerics.iterations=", "numerics.adaptive_tolerance_N=", "numerics.smallest_dt_s=",
+    "numerics.eps_d_m=", "numerics.eps_v_m_per_s=", "numerics.eps_force_N=",
+    "numerics.max_iterations=", "numerics.coupling=", "numerics.scheme=one_solve",
+    "window.mode=off", "window.tolerance=", "window.spans_ahead=", "window.spans_behind=",
+    "contact.restitution=", "contact.hertz_stiffness_N_per_m1_5=", "contact.damping_N_s_per_m=",
+    "contact.least_impact_speed_m_per_s=", "contact.law=linear", "effects.contact_damping=false",
+    "effects.contact_loss=false", "effects.residual_dropper_stiffness=false",
+    "effects.dropper_slackening=false", "effects.uplift_stops=false",
+    "effects.pantograph_laws=false", "effects.regulated_lift=false", "effects.gusts=false",
     "incidents=",
-)
+)  # fmt: skip
 # Steps of the map [s], and how closely a limit is found by marching.
 STEPS_RANGE = (1e-5, MAX_DT)
 RESOLUTION = 0.02
@@ -281,14 +265,12 @@ def find(
     """
     numerics = bench.rest.problem.numerics
     methods = theory.methods_of(numerics)
-    masses = (head_mass, *bench.data.masses[1:])
-    both = theory.couple(line, LumpedData(masses, bench.data.stiffnesses, bench.data.dampings))
+    both = theory.couple(line, bench.with_head(head_mass), methods)
     seen = GROWN ** (1.0 / STEPS)
     if coupling not in ("implicit", "explicit"):
         seen = (AGREED / _START) ** (1.0 / EXCHANGES)
     expected, visible = (
-        theory.largest_step(both, methods, stiffness, coupling, _THEORY_RANGE, allowed)
-        for allowed in (1.0, seen)
+        both.largest_step(stiffness, coupling, _THEORY_RANGE, allowed) for allowed in (1.0, seen)
     )
     if coupling == "implicit":
         # A limit could be anywhere, and stability above it.
@@ -311,10 +293,10 @@ def as_rows(found: StabilityMap) -> list[dict[str, Any]]:
             "stiffness_N_per_m": one.stiffness,
             "head_mass_kg": one.head_mass,
             "wire_mass_kg": found.wire_mass,
-            "theory_s": one.theory if np.isfinite(one.theory) else None,
-            "omega_dt_2_s": one.closed_form if np.isfinite(one.closed_form) else None,
+            "theory_s": plain(one.theory),
+            "omega_dt_2_s": plain(one.closed_form),
             "marched_stable_s": one.stable,
-            "marched_unstable_s": one.unstable if np.isfinite(one.unstable) else None,
+            "marched_unstable_s": plain(one.unstable),
             "agrees": "yes" if one.agrees else "no",
         }
         for one in found.limits
