@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from catenary.cases.ambrosio2012.passages import leading_position, mid_span
-from catenary.cases.studies.paper.runs import LEADING, SINGLE, TRAILING, Rows, name_of
+from catenary.cases.studies.paper_study import LEADING, SINGLE, TRAILING, Rows, name_of
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import histogram
 from catenary.postproc.read.results import Results

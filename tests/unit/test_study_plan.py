@@ -15,7 +15,7 @@ from verb_runner import invoke
 from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE, variants
 from catenary.cases.studies.case_study import StudyVariant, make_plan
-from catenary.cases.studies.paper.runs import PaperStudy, changes_of
+from catenary.cases.studies.paper_study import PaperStudy, changes_of
 from catenary.postproc.report.study_report import (
     NOT_REPRODUCED,
     REPRODUCED,
