@@ -152,10 +152,8 @@ def measured_errors(scene: Scene, folder: Path) -> dict[str, float]:
     own = [
         row
         for row in rows
-        if row["outcome"] == "done"
-        and row["elements_per_gap"] == elements
-        and row["dt_s"] is not None
-        and abs(row["dt_s"] / dt - 1.0) < 1e-9
+        if (row["outcome"], row["elements_per_gap"]) == ("done", elements)
+        and abs((row["dt_s"] or 0.0) / dt - 1.0) < 1e-9
     ]
     if not own:
         raise InputError(
@@ -294,26 +292,20 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
         yield [f"droppers, {joined}", len(group.lower_x), _of_dropper(group.kind)]
     for arms in line.steady_arms:
         kind = arms.kind
+        stop, held = kind.uplift_stop, stiffness_words(kind.stop_stiffness)
         known = [
             (kind.length, f"{kind.length:g} m"),
             (kind.mass_per_length, f"{kind.mass_per_length:g} kg/m"),
             (kind.clamp_mass, f"clamp {kind.clamp_mass:g} kg"),
             (kind.by_radial_force, "vertical stiffness radial force over length"),
             (kind.stiffness, f"vertical stiffness {stiffness_words(kind.stiffness)}"),
+            (stop is not None, f"stop at {1e3 * (stop or 0.0):g} mm with {held}"),
         ]
-        parts = [text for value, text in known if value]
-        if kind.uplift_stop is not None:
-            stop = (
-                f"stop at {1e3 * kind.uplift_stop:g} mm with {stiffness_words(kind.stop_stiffness)}"
-            )
-            parts.append(stop)
-        yield [f"steady arms on {wire_words(arms.wire)}", len(arms.x), ", ".join(parts)]
+        parts = ", ".join(text for value, text in known if value)
+        yield [f"steady arms on {wire_words(arms.wire)}", len(arms.x), parts]
     for supports in line.supports:
-        yield [
-            f"supports of {wire_words(supports.wire)}",
-            len(supports.x),
-            f"stiffness {stiffness_words(supports.stiffness)}",
-        ]
+        held = f"stiffness {stiffness_words(supports.stiffness)}"
+        yield [f"supports of {wire_words(supports.wire)}", len(supports.x), held]
     for clamps in line.clamps:
         joined = f"{wire_words(clamps.upper)} to {wire_words(clamps.lower)}"
         held = f"stiffness {stiffness_words(clamps.stiffness)}, {clamps.mass:g} kg"
@@ -414,20 +406,17 @@ def _pantograph_blocks(
                     for body in data.system.bodies]  # fmt: skip
             heads = ["body", "mass [kg]", "Ixx [kg m²]", "Iyy [kg m²]", "Izz [kg m²]"]
             yield texts_table(heads, rows, {1, 2, 3, 4})
-        strips = data.strips
-        rows = [["collector strips", str(strips.number), ""]]
-        if strips.number > 1:
-            rows.append(["distance of the strips", number(strips.spacing, 3), "m"])
-        if strips.length is not None:
-            rows.append(["length of a strip", number(strips.length, 3), "m"])
-        if strips.suspension is not None:
-            own = strips.suspension
-            rows += [
-                ["mass of a strip", f"{own.mass:g}", "kg"],
-                ["stiffness below a strip", f"{own.stiffness:g}", "N/m"],
-                ["damping below a strip", f"{own.damping:g}", "N s/m"],
-            ]
-        yield texts_table(["head", "value", "unit"], rows, {1})
+        strips, own = data.strips, data.strips.suspension
+        head = [
+            ("collector strips", str(strips.number), ""),
+            ("distance of the strips", strips.number > 1 and number(strips.spacing, 3), "m"),
+            ("length of a strip", strips.length is not None and number(strips.length, 3), "m"),
+            ("mass of a strip", own and f"{own.mass:g}", "kg"),
+            ("stiffness below a strip", own and f"{own.stiffness:g}", "N/m"),
+            ("damping below a strip", own and f"{own.damping:g}", "N s/m"),
+        ]
+        known = [row for row in head if row[1]]
+        yield texts_table(["head", "value", "unit"], known, {1})
 
 
 @figures.own_style()
@@ -619,8 +608,7 @@ def _statement_blocks(
         yield Text(f"It is not one of the program of this run, {made_by}.", "remark")
     rows = [[number, *step] for number, step in enumerate(statement["steps"], start=1)]
     yield texts_table(["", "step", "result"], rows, {0})
-    failed = [row for row in statement["figures"] if row["verdict"] == FAILED]
-    if failed:
+    if failed := [row for row in statement["figures"] if row["verdict"] == FAILED]:
         yield readers_table(failed, "Figures beyond their limits")
     yield Text(" ".join(statement["closing"]))
 

@@ -276,34 +276,21 @@ def _energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
 def as_rows(theory: WaveTheory) -> list[Row]:
     """Figures with unit and meaning; those that the line does not have are left out."""
     of_string = "" if theory.by_bending else ", sqrt(T / m)"
-    doppler = "Doppler factor of an echo from ahead, (c - v) / (c + v)"
-    sent_back = "reflection coefficient of a stiff dropper on the contact wire, Z_m / (Z_c + Z_m)"
-    grows = (
-        "amplification of a wave between head and dropper, reflection coefficient / Doppler factor"
-    )
+    fastest, at = (np.nan, np.nan) if theory.bloch is None else theory.bloch.fastest(20.0)
     rows = [
         ("train_speed", theory.speed, "m/s", "speed of the train"),
         ("wave_speed", theory.wave_speed, "m/s", f"slowest wave of the contact wire{of_string}"),
-        ("doppler_factor", theory.doppler, "-", doppler),
-        ("dropper_reflection", theory.reflection, "-", sent_back),
-        ("amplification", theory.amplification, "-", grows),
-    ]
-    if theory.bloch is not None:
-        speed, at = theory.bloch.fastest(20.0)
-        rows += [
-            (
-                "fastest_group_velocity",
-                speed,
-                "m/s",
-                "greatest group velocity of the periodic line up to 20 Hz",
-            ),
-            (
-                "frequency_of_the_fastest",
-                at,
-                "Hz",
-                "frequency of the wave with the greatest group velocity",
-            ),
-        ]
+        ("doppler_factor", theory.doppler, "-",
+         "Doppler factor of an echo from ahead, (c - v) / (c + v)"),
+        ("dropper_reflection", theory.reflection, "-",
+         "reflection coefficient of a stiff dropper on the contact wire, Z_m / (Z_c + Z_m)"),
+        ("amplification", theory.amplification, "-", "amplification of a wave between head and "
+         "dropper, reflection coefficient / Doppler factor"),
+        ("fastest_group_velocity", fastest, "m/s",
+         "greatest group velocity of the periodic line up to 20 Hz"),
+        ("frequency_of_the_fastest", at, "Hz",
+         "frequency of the wave with the greatest group velocity"),
+    ]  # fmt: skip
     return [row_of(*row) for row in rows if np.isfinite(row[1])]
 
 
