@@ -10,7 +10,7 @@ figures alone: it reads no file and runs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from string import Template
@@ -197,12 +197,10 @@ class PaperStudy:
             for damping, alpha in self.table["dampings"].items():
                 for train in self.table["trains"]:
                     words = (*always, *alpha, *reading["set"], *train["set"])
-                    keys = {
-                        "reading": reading["name"], "damping": damping, "train": train["name"]
-                    }  # fmt: skip
-                    variant = Variant(
-                        run_name(*keys.values()), _filled(words, reading.get("kind", own)), keys
-                    )
+                    place = reading["name"], damping, train["name"]
+                    keys = dict(zip(("reading", "damping", "train"), place, strict=True))
+                    filled = _filled(words, reading.get("kind", own))
+                    variant = Variant(run_name(*place), filled, keys)
                     planned.append(StudyVariant(variant, reading.get("figures", False)))
         for title, changes in self.variations().items():
             for damping, alpha in self.table["dampings"].items():
@@ -225,15 +223,17 @@ class PaperStudy:
             if (name := run_name(reading, damping, train)) in runs
         })  # fmt: skip
 
-    def rows_of_variations(self, runs: Mapping[str, StudyRun]) -> Iterator[tuple[str, Rows]]:
-        """Title and figures of each variation that was planned."""
-        for title in self.variations():
-            names = {damping: run_name(VARIED, damping, title) for damping in self.dampings}
-            if all(name in runs for name in names.values()):
-                yield title, Rows.of({
-                    (damping, self.trains[0]): figures_of(runs[name])
-                    for damping, name in names.items()
-                })  # fmt: skip
+    def rows_of_variations(self, runs: Mapping[str, StudyRun]) -> dict[str, Rows]:
+        """Figures of each variation that was planned, by its title."""
+        names = {
+            title: {(own, self.trains[0]): run_name(VARIED, own, title) for own in self.dampings}
+            for title in self.variations()
+        }
+        return {
+            title: Rows.of({place: figures_of(runs[name]) for place, name in own.items()})
+            for title, own in names.items()
+            if runs.keys() >= set(own.values())
+        }
 
 
 def run_name(reading: str, damping: str, train: str) -> str:
@@ -315,7 +315,7 @@ def conclude(study: PaperStudy, runs: Mapping[str, StudyRun], draw: Draw) -> Stu
     found = {name: judge(statements, own) for name, own in rows.items()}
     first, *others = readings
     start = rows[first["name"]].only(study.trains[:1])
-    ranked = rank(start, dict(study.rows_of_variations(runs)), study)
+    ranked = rank(start, study.rows_of_variations(runs), study)
     named = judge(statements, rows[first["name"]].only(study.named_trains))
     explained = []
     for i, one in enumerate(found[first["name"]]):
@@ -346,22 +346,20 @@ def _drawn(
 ) -> list[StudyFigure]:
     """The pictures of all readings that are to be shown, beside each other."""
     drawn: list[tuple[str, StudyFigure]] = []
+    done = {name: run for name, run in runs.items() if run.ended.done}
     for number, reading in enumerate(shown):
+        name, title = reading["name"], reading["title"]
         folders = {
             damping: {
-                train: run.folder
+                train: done[run].folder
                 for train in study.trains
-                if (run := runs.get(run_name(reading["name"], damping, train))) is not None
-                and run.ended.done
+                if (run := run_name(name, damping, train)) in done
             }
             for damping in study.dampings
         }
-        for one in draw(folders, rows[reading["name"]]):
-            renamed = replace(
-                one,
-                name=f"{one.name}_{reading['name']}",
-                caption=f"{one.caption[:-1]}: {reading['title']}.",
-            )
+        for one in draw(folders, rows[name]):
+            caption = f"{one.caption[:-1]}: {title}."
+            renamed = replace(one, name=f"{one.name}_{name}", caption=caption)
             drawn.append((one.name, renamed if number else one))
     return [one for _, one in sorted(drawn, key=lambda pair: pair[0])]
 
@@ -376,11 +374,8 @@ def _explained(
     """The finding with the reason that the runs give where it differs from the paper."""
     if finding.verdict != NOT_REPRODUCED:
         return finding
-    parts = []
-    if named.found != finding.found:
-        parts.append(
-            f"With only the separations that the text names: {named.verdict} ({named.found})."
-        )
+    only = f"With only the separations that the text names: {named.verdict} ({named.found})."
+    parts = [only] if named.found != finding.found else []
     met = {title: one for title, one in others.items() if one.verdict == REPRODUCED}
     parts += [f"Reproduced with {title}: {one.found}." for title, one in met.items()]
     if others and not met:
@@ -678,14 +673,12 @@ def ranking_table(study: PaperStudy, ranked: Sequence[Ranked]) -> StudyTable:
     rows = []
     for one in ranked:
         own = values(one.rows, figure)
-        changes = [
-            f"{a - b:+.1f}" for a, b in zip(own, values(ranked[0].rows, figure), strict=True)
-        ]
+        case = values(ranked[0].rows, figure)
+        changes = [f"{a - b:+.1f}" if one.title else "" for a, b in zip(own, case, strict=True)]
         pairs = [
             " / ".join(format(value, FIGURES[name].format) for value in values(one.rows, name))
             for name in ranking["shown"]
         ]
-        changes = changes if one.title else ["" for _ in changes]
         rows.append([one.title or "the case", *(f"{v:.1f}" for v in own), *changes, *pairs])
     note = (
         f"One input at a time, one pantograph, in the order of their effect on {head}; "
