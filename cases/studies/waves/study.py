@@ -28,7 +28,7 @@ from catenary.cases.studies.waves import obstacles, pictures
 from catenary.cases.studies.waves.seen import (
     EnergyMotion,
     EnergySeen,
-    NodeMotion,
+    TakesMotion,
     WavesSeen,
     WireMotion,
     course_of,
@@ -122,7 +122,7 @@ def study_waves(folder: Path) -> tuple[str, list[Path]]:
                     "output.fields"
                 )
             energy = EnergyMotion(rest, numbers)
-            seen = waves_seen(data, snapshots, [energy])
+            seen = waves_seen(data, snapshots, [energy.add])
             ends = np.array([snapshots.moving(n) for n in range(snapshots.times.size)])
             moving = np.column_stack(
                 [np.maximum(ends[1:, 0], ends[:-1, 0]), np.minimum(ends[1:, 1], ends[:-1, 1])]
@@ -169,8 +169,9 @@ def study_excited(
 
     def watching(rest: LineAtRest) -> list[Observer]:
         wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
-        found.append((rest, wire, EnergyMotion(rest)))
-        return [Watch(max(1, round(every / problem.numerics.dt)), found[-1][1:])]
+        energy = EnergyMotion(rest)
+        found.append((rest, wire, energy))
+        return [Watch(max(1, round(every / problem.numerics.dt)), [wire.add, energy.add])]
 
     run = ExcitedRun(without_train(problem, excitation), excitation, every, watching)
     ended = run_case(scene, folder, MPI.COMM_SELF, force=force, only_summary=True, excited=run)
@@ -459,7 +460,7 @@ class Watch(Observer):
     seen : receivers of the motion
     """
 
-    def __init__(self, every: int, seen: Sequence[NodeMotion]) -> None:
+    def __init__(self, every: int, seen: Sequence[TakesMotion]) -> None:
         self._every, self._seen = every, seen
 
     def start(self, stage: Stage) -> None:
@@ -481,5 +482,5 @@ class Watch(Observer):
             moved = np.zeros((self._nodes.size, 3))
             for axis, name in self._axes:
                 moved[self._nodes, axis] = view.node_motion(name, False)
-            for one in self._seen:
-                one.add(view.time, moved)
+            for take in self._seen:
+                take(view.time, moved)
