@@ -51,7 +51,7 @@ def draw(folders: Folders, rows: Rows) -> list[StudyFigure]:
             for damping, trains in folders.items()
         }
         if any(shown.values()):
-            figures += [_uplift(shown), _droppers(shown)]
+            figures += [_passages(shown, *one) for one in _PASSED]
         figures += [_by_separation(13, LIGHT, rows), _by_separation(14, AVERAGE, rows)]
     return figures
 
@@ -152,39 +152,34 @@ def _histograms(folders: Folders) -> StudyFigure:
     return StudyFigure("figure_10", "Figure 10: histograms of the contact force.", figure, columns)
 
 
-def _uplift(shown: Folders) -> StudyFigure:
-    """Figure 11: uplift at the arm nearest to the middle of the stretch."""
-
-    def record(results: Results) -> tuple[float, np.ndarray]:
-        x = results.line("arm_x")
-        arm = int(np.argmin(np.abs(x - np.mean(results.evaluation))))
-        return float(x[arm]), 1e3 * results.column("arm_uplift", arm)
-
-    return _passages(
-        shown, record, "figure_11", "uplift [mm]",
-        "Figure 11: uplift at the steady arm in the middle of the stretch.",
-    )  # fmt: skip
+def _arm(results: Results) -> tuple[float, np.ndarray]:
+    """Place of the arm nearest to the middle of the stretch [m], and its uplift [mm]."""
+    x = results.line("arm_x")
+    arm = int(np.argmin(np.abs(x - np.mean(results.evaluation))))
+    return float(x[arm]), 1e3 * results.column("arm_uplift", arm)
 
 
-def _droppers(shown: Folders) -> StudyFigure:
-    """Figure 12: force of a dropper next to the middle of the span in the stretch's middle."""
+def _dropper(results: Results) -> tuple[float, np.ndarray]:
+    """Place of a dropper next to the middle of the span in the stretch's middle [m], and its force
+    [N]."""
+    x, span = results.line("dropper_x"), results.line("dropper_span")
+    chosen = int(np.flatnonzero(mid_span(results) & (span == results.reference_span))[0])
+    return float(x[chosen]), results.column("dropper_force", chosen)
 
-    def record(results: Results) -> tuple[float, np.ndarray]:
-        x, span = results.line("dropper_x"), results.line("dropper_span")
-        chosen = np.flatnonzero(mid_span(results) & (span == results.reference_span))
-        return float(x[chosen[0]]), results.column("dropper_force", int(chosen[0]))
 
-    return _passages(
-        shown, record, "figure_12", "dropper force [N]",
-        "Figure 12: force of a mid-span dropper in the middle of the stretch; 0 is slack.",
-    )  # fmt: skip
+# Figures over the time since the head has passed: number, record, its quantity, and caption.
+_PASSED = (
+    (11, _arm, "uplift [mm]", "uplift at the steady arm in the middle of the stretch."),
+    (12, _dropper, "dropper force [N]",
+     "force of a mid-span dropper in the middle of the stretch; 0 is slack."),
+)  # fmt: skip
 
 
 @figures.own_style()
 def _passages(
     shown: Folders,
+    n: int,
     record: Callable[[Results], tuple[float, np.ndarray]],
-    name: str,
     what: str,
     caption: str,
 ) -> StudyFigure:
@@ -211,7 +206,7 @@ def _passages(
         figures.tidy(axes, "", what, _PANELS[damping])
     panels[-1].set_xlabel("time since the leading head has passed [s]; dashed: heads pass")
     figures.legend_above(panels[0], columns=2)
-    return StudyFigure(name, caption, figure, columns)
+    return StudyFigure(f"figure_{n}", f"Figure {n}: {caption}", figure, columns)
 
 
 @figures.own_style()

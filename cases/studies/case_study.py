@@ -114,11 +114,7 @@ def make_plan(case: str, overrides: Sequence[str] = (), shortened: bool = False)
 
 
 def run(
-    plan: Plan,
-    out_dir: Path,
-    comm: Any,
-    options: RunOptions = AS_USUAL,
-    part: Part | None = None,
+    plan: Plan, out_dir: Path, comm: Any, options: RunOptions = AS_USUAL, part: Part | None = None
 ) -> tuple[str | None, list[Ended]]:
     """Run what is not done yet, write the study's report; returns its text and the runs.
 

@@ -27,13 +27,7 @@ from catenary.cases.scene.input.case_files import Assigned
 from catenary.cases.scene.input.faults import shown_word
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene, end_of, problem_of
-from catenary.cases.studies.sweep.jobs import (
-    Ended,
-    Job,
-    RunOptions,
-    interrupted,
-    statistics_of,
-)
+from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, interrupted, statistics_of
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.evaluate.wording import counted, fixed

@@ -387,9 +387,7 @@ def _pantographs_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
 
 
-def _pantograph_blocks(
-    kinds: dict[str, tuple[Placement, str]],
-) -> Iterator[Text | StudyTable]:
+def _pantograph_blocks(kinds: dict[str, tuple[Placement, str]]) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
         yield Text(f"{description}.", "", f"{_spaced(name)}:")
         data = placement.data

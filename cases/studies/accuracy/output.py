@@ -25,12 +25,7 @@ from catenary.cases.studies.accuracy.runs import Measured, PlannedAxis
 from catenary.postproc.evaluate.wording import capital, counted
 from catenary.postproc.files.disk import plain
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import (
-    Column,
-    Content,
-    StudyTable,
-    remark_lines,
-)
+from catenary.postproc.report.study_table import Column, Content, StudyTable, remark_lines
 
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
 PICTURE = "work_precision.png"

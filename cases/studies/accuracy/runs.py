@@ -234,10 +234,7 @@ def measure(results: Results) -> dict[str, Any]:
 
 
 def run(
-    plan: Plan,
-    out_dir: Path,
-    comm: Any,
-    options: RunOptions = AS_USUAL,
+    plan: Plan, out_dir: Path, comm: Any, options: RunOptions = AS_USUAL
 ) -> tuple[Measured, list[Ended]]:
     """Run what is not done yet; returns the measurements and all runs. Collective.
 

@@ -108,10 +108,7 @@ class SpeedStudy(NamedTuple):
 
 
 def find_speeds(
-    marching: Marching,
-    speeds: Speeds,
-    wanted: Sequence[str],
-    direction: str | None = None,
+    marching: Marching, speeds: Speeds, wanted: Sequence[str], direction: str | None = None
 ) -> SpeedStudy:
     """March the speeds, and find where the criteria hold. Collective.
 

@@ -32,13 +32,7 @@ from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import Variant, text_of
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import (
-    Column,
-    Content,
-    Row,
-    StudyTable,
-    remark_lines,
-)
+from catenary.postproc.report.study_table import Column, Content, Row, StudyTable, remark_lines
 
 if TYPE_CHECKING:
     from catenary.cases.studies.waves.theory import WaveTheory

@@ -23,14 +23,6 @@ from catenary.cases.scene.scene import Scene, resolved
 from catenary.cases.studies.hard.runs import at_rest
 from catenary.cases.studies.records import NOTHING_KEPT, KeptRows
 from catenary.cases.studies.stability import coupling_schemes as theory
-from catenary.cases.studies.stability.coupling_schemes import (
-    AGREED,
-    COUPLINGS,
-    EXCHANGES,
-    GROWN,
-    STEPS,
-    Bench,
-)
 from catenary.cases.terminal.runs_bar import RunsBar
 from catenary.mbs.lumped_data import LumpedData
 from catenary.postproc.files.disk import plain
@@ -220,12 +212,12 @@ class _FindLimits:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._bench: tuple[Bench, theory.PointModel] | None = None
+        self._bench: tuple[theory.Bench, theory.PointModel] | None = None
 
     def __reduce__(self) -> tuple[type[_FindLimits], tuple[Scene]]:
         return type(self), (self._scene,)
 
-    def bench(self, comm: Any) -> tuple[Bench, theory.PointModel]:
+    def bench(self, comm: Any) -> tuple[theory.Bench, theory.PointModel]:
         """Bench at the place where heads are tried, and the line reduced to that place."""
         if self._bench is None:
             rest = at_rest(self._scene, comm)
@@ -235,13 +227,13 @@ class _FindLimits:
             place = _place(rest, wires)
             loads = theory.loads_at(wires, place, rest.model.n_dofs)
             line = theory.point_model(rest.model, loads)
-            self._bench = Bench(rest, data, place, comm), line
+            self._bench = theory.Bench(rest, data, place, comm), line
         return self._bench
 
     def __call__(self, pair: tuple[float, float], comm: Any) -> list[Any]:
         """Rows of ``Limit`` for a stiffness [N/m] and a head mass [kg]."""
         bench, line = self.bench(comm)
-        return [astuple(find(bench, line, coupling, *pair)) for coupling in COUPLINGS]
+        return [astuple(find(bench, line, coupling, *pair)) for coupling in theory.COUPLINGS]
 
 
 def _place(rest: LineAtRest, wires: ContactWires) -> float:
@@ -256,7 +248,7 @@ def _place(rest: LineAtRest, wires: ContactWires) -> float:
 
 
 def find(
-    bench: Bench, line: theory.PointModel, coupling: str, stiffness: float, head_mass: float
+    bench: theory.Bench, line: theory.PointModel, coupling: str, stiffness: float, head_mass: float
 ) -> Limit:
     """The limit of a ``coupling`` for a head of ``head_mass`` [kg] on a contact of ``stiffness``
     [N/m]. Not collective.
@@ -266,9 +258,9 @@ def find(
     numerics = bench.rest.problem.numerics
     methods = theory.methods_of(numerics)
     both = theory.couple(line, bench.with_head(head_mass), methods)
-    seen = GROWN ** (1.0 / STEPS)
+    seen = theory.GROWN ** (1.0 / theory.STEPS)
     if coupling not in ("implicit", "explicit"):
-        seen = (AGREED / _START) ** (1.0 / EXCHANGES)
+        seen = (theory.AGREED / _START) ** (1.0 / theory.EXCHANGES)
     expected, visible = (
         both.largest_step(stiffness, coupling, _THEORY_RANGE, allowed) for allowed in (1.0, seen)
     )
@@ -306,7 +298,7 @@ def as_rows(found: StabilityMap) -> list[dict[str, Any]]:
 def as_text(found: StabilityMap) -> str:
     """A sentence for each coupling."""
     lines = [f"{found.case} at {found.place:.2f} m, where {meets(found)} {found.wire_mass:.3g} kg:"]
-    for coupling in COUPLINGS:
+    for coupling in theory.COUPLINGS:
         limits = found.of(coupling)
         agree = sum(one.agrees for one in limits)
         both = [one for one in limits if np.isfinite(one.theory) and one.marched < np.inf]

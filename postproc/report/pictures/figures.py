@@ -10,7 +10,7 @@ import contextlib
 import io
 import logging
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -175,24 +175,13 @@ def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, lis
     return figure, list(panels[:, 0])
 
 
-def colour(pantograph: int) -> str:
-    """Colour of a pantograph, the same in all pictures."""
-    return COLOURS[pantograph % len(COLOURS)]
+def _in_turns(looks: Sequence[str]) -> Callable[[int], str]:
+    """Looks by the number of a pantograph or curve, after the last one the first again."""
+    return lambda number: looks[number % len(looks)]
 
 
-def line(number: int) -> str:
-    """Line of a curve in a panel of several."""
-    return LINES[number % len(LINES)]
-
-
-def mark(number: int) -> str:
-    """Mark of a curve in a panel of several."""
-    return MARKS[number % len(MARKS)]
-
-
-def hatch(number: int) -> str:
-    """Hatching of bars in a panel of several."""
-    return HATCHES[number % len(HATCHES)]
+# Colour of a pantograph, the same in all pictures; line, mark and hatching in a panel of several.
+colour, line, mark, hatch = map(_in_turns, (COLOURS, LINES, MARKS, HATCHES))
 
 
 def curve(
