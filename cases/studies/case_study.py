@@ -2,7 +2,7 @@
 
 A case folder may hold a ``study.py`` with three functions:
 
-- ``variants(scene, shortened)`` gives the ``StudyVariant`` s; it loads no backend;
+- ``variants(scene, shortened)`` gives the ``StudyVariant`` s; it starts neither MPI nor PETSc;
 - ``measure(results)`` takes plain figures from each run's result file;
 - ``conclude(runs)`` turns the runs by name into a ``postproc.report.study_report.Study``.
 
