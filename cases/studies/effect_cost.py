@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,7 +28,7 @@ from catenary.cases.scene.input.case_files import Assigned
 from catenary.cases.scene.input.faults import shown_word
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene, end_of, problem_of
-from catenary.cases.studies.sweep.jobs import Ended, Job, RunOptions, interrupted, statistics_of
+from catenary.cases.studies.sweep.jobs import Job, RunOptions, interrupted, statistics_of
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.evaluate.wording import counted, fixed
@@ -324,9 +325,9 @@ def measure(
     scene = jobs[0].scene
     problem = problem_of(scene)
     first, n_steps = _round_of(problem)
-    runs: dict[str, tuple[Job, Ended]] = {
-        one.variant.name: (job, one) for job, one in zip(jobs[1:], others, strict=True)
-    }
+    outcomes = refused | {one.variant.name: one.outcome for one in others}
+    pairs = zip(jobs[1:], others, strict=True)
+    done = {one.variant.name: (job.scene, one) for job, one in pairs if one.done}
     rows = []
     with (
         Phase(comm, "steps were timed", "runs are kept where -o names a folder") as phase,
@@ -336,12 +337,11 @@ def measure(
         for number, switch in enumerate(effects.switches, start=1):
             phase.next(f"steps without or with {switch.name} were timed")
             say(f"[{number}/{len(effects.switches)}] steps: {switch.name}")
-            job, one = runs.get(switch.name, (None, None))
-            if job is None or one is None or not one.done:
-                outcome = refused[switch.name] if one is None else one.outcome
-                rows.append(Measured(switch, outcome))
+            if switch.name not in done:
+                rows.append(Measured(switch, outcomes[switch.name]))
                 continue
-            with RepeatedMarch(comm, rest_of(job.scene), first, n_steps) as march:
+            own_scene, one = done[switch.name]
+            with RepeatedMarch(comm, rest_of(own_scene), first, n_steps) as march:
                 timed, own = beside(march, as_it_is, options.rounds), march.size
             figures = statistics_of(one.summary)
             rows.append(Measured(switch, "done", own, timed.ratio, figures, one.remarks))
@@ -372,7 +372,7 @@ class Size(NamedTuple):
     planes: tuple[int, ...]
 
 
-class RepeatedMarch:
+class RepeatedMarch(AbstractContextManager["RepeatedMarch"]):
     """A march over some steps that starts again and again from one of its states.
 
     Collective to make. A context manager that destroys the march.
@@ -420,9 +420,6 @@ class RepeatedMarch:
     def destroy(self) -> None:
         """Collective."""
         self._march.destroy()
-
-    def __enter__(self) -> RepeatedMarch:
-        return self
 
     def __exit__(self, *error: object) -> None:
         self.destroy()

@@ -185,7 +185,7 @@ def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
     known = {what: value for what, value in percent.items() if math.isfinite(value)}
     if not known:
         return f"the uncertainty of the reference is not known from {from_runs}"
-    values = ", ".join(f"{what} {f'{value:.3g}'}" for what, value in known.items())
+    values = ", ".join(f"{what} {value:.3g}" for what, value in known.items())
     return f"uncertainty of the reference, from {from_runs} [%]: {values}"
 
 

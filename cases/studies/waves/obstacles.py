@@ -42,6 +42,9 @@ _HALVES = 1.9
 _KEPT = frozenset({"vertical", "dropper_mass", "clamp_mass", "arm_inertia", "arm_stiffness"})
 
 
+Part = Droppers | SteadyArms | Supports
+
+
 class Obstacle(NamedTuple):
     """An obstacle alone on its wires, its springs and masses in theory.
 
@@ -62,7 +65,7 @@ class Obstacle(NamedTuple):
     wires: tuple[Wire, ...]
     stiffness: np.ndarray
     mass: np.ndarray
-    parts: tuple[Droppers | SteadyArms | Supports, ...] = ()
+    parts: tuple[Part, ...] = ()
     dropper_length: float = 1.0
     beyond: Conductor | None = None
     ends: bool = False
@@ -268,7 +271,7 @@ def obstacles_of(rest: LineAtRest) -> list[Obstacle]:
         tension = np.median(rest.form.dropper_force[mine], keepdims=True)
         k = float(slopes.at(slopes.piece_under(tension)).slope[0])
         spring = replace(group.kind, stiffness=k, axial_stiffness=None, curve=None)
-        part = replace(group, kind=spring, upper_x=(HALF,), lower_x=(HALF,))
+        part: Part = replace(group, kind=spring, upper_x=(HALF,), lower_x=(HALF,))
         springs = k * np.array([[1.0, -1.0], [-1.0, 1.0]])
         name = f"{group.name} ({length:.2f} m)"
         found.append(Obstacle(name, wires, springs, np.diag(masses), (part,), length))
@@ -294,7 +297,7 @@ def obstacles_of(rest: LineAtRest) -> list[Obstacle]:
 
 
 def _on_one(
-    name: str, wire: Wire, stiffness: float = 0.0, mass: float = 0.0, *parts: SteadyArms | Supports
+    name: str, wire: Wire, stiffness: float = 0.0, mass: float = 0.0, *parts: Part
 ) -> Obstacle:
     return Obstacle(name, (wire,), np.array([[stiffness]]), np.array([[mass]]), parts)
 

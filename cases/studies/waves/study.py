@@ -375,13 +375,9 @@ def _force_of(settings: Excited, problem: Problem) -> float:
 def _moving_force(settings: Excited, problem: Problem, dt: float) -> MovingForce:
     """A force that moves with the train."""
     train = problem.train
-    frequency = settings.frequency or 0.0
-    highest = 0.1 / dt
-    if not 0.0 <= frequency <= highest:
-        raise InputError(
-            f"--frequency-Hz is {frequency:g}, but must be from 0 to {highest:g}, ten time "
-            "steps a period"
-        )
+    frequency, highest = settings.frequency or 0.0, 0.1 / dt
+    allowed = f"be from 0 to {highest:g}, ten time steps a period"
+    _refuse_unless(0.0 <= frequency <= highest, "--frequency-Hz", frequency, allowed)
     force = _force_of(settings, problem)
     _refuse_too_strong("--force-N", force, force)
     return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
@@ -395,16 +391,12 @@ def _blow(kind: str, settings: Excited, problem: Problem, dt: float) -> Blow:
             "take exact, or off"
         )
     duration = DURATIONS[kind] if settings.duration is None else settings.duration
-    if not 10 * dt <= duration <= 10.0:
-        raise InputError(
-            f"--duration-s is {duration:g}, but must be from {10 * dt:g}, ten time steps, to 10"
-        )
+    allowed = f"be from {10 * dt:g}, ten time steps, to 10"
+    _refuse_unless(10 * dt <= duration <= 10.0, "--duration-s", duration, allowed)
     ends = problem.line.support_positions[[0, -1]]
     at = float(ends.mean()) if settings.at is None else settings.at
-    if not ends[0] < at < ends[1]:
-        raise InputError(
-            f"--at-m is {at:g}, but must lie on the line, from {ends[0]:g} to {ends[1]:g} m"
-        )
+    allowed = f"lie on the line, from {ends[0]:g} to {ends[1]:g} m"
+    _refuse_unless(bool(ends[0] < at < ends[1]), "--at-m", at, allowed)
     if kind == HAMMER:
         impulse = IMPULSE if settings.impulse is None else settings.impulse
         blow = hammer(at, impulse, duration)
@@ -413,6 +405,11 @@ def _blow(kind: str, settings: Excited, problem: Problem, dt: float) -> Blow:
     force = _force_of(settings, problem)
     _refuse_too_strong("--force-N", force, force)
     return Blow(at, duration, force, False)
+
+
+def _refuse_unless(is_allowed: bool, option: str, value: float, allowed: str) -> None:
+    if not is_allowed:
+        raise InputError(f"{option} is {value:g}, but must {allowed}")
 
 
 def _refuse_too_strong(option: str, value: float, peak: float) -> None:
