@@ -74,7 +74,7 @@ class HardCase(Table):
     right: str = Field(min_length=1, description="what a right answer is")
     kind: Literal["train", "free"] = Field("train", description="what moves")
     set: list[str] = Field(
-        default_factory=list, description="assignments, as after --set, or names of `sets`"
+        default_factory=list, description="assignments, as after --set, or names of sets and lines"
     )
     short: list[str] = Field(default_factory=list, description="further ones of the short form")
     force_below_N: float = Field(1e3, gt=0, description="no contact force is greater")
@@ -117,8 +117,7 @@ class HardCase(Table):
         """Its scene, in the ``short`` form, with the step halved ``halvings`` times, or with the
         paper's ``fixed_point`` correction."""
         table = collection()
-        own = (table.sets.get(word, [word]) for word in self.set)
-        words = [*table.common, *chain(*own), *(self.short if short else [])]
+        words = [*table.common, *table.assignments(self.set), *(self.short if short else [])]
         words += _CORRECTION if fixed_point else ()
         scene = load_scene(table.base, words)
         if halvings:
@@ -151,6 +150,12 @@ class Collection(Table):
     conditions: list[HardCase] = Field(
         default_factory=list, description="what each of these lines is put under"
     )
+
+    def assignments(self, words: list[str]) -> list[str]:
+        """Assignments of words that are such, or names of sets or lines."""
+        named = {line.name: line.set for line in self.lines} | self.sets
+        parts = (self.assignments(named[word]) if word in named else [word] for word in words)
+        return [*chain(*parts)]
 
     def all_cases(self) -> list[HardCase]:
         """The cases, and each line under each condition unless a case has that name."""
