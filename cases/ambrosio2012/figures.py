@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from catenary.cases.ambrosio2012.passages import leading_position, mid_span
-from catenary.cases.studies.paper.runs import LEADING, SINGLE, TRAILING, Rows, name_of
+from catenary.cases.studies.paper_study import LEADING, SINGLE, TRAILING, Rows, name_of
 from catenary.postproc.evaluate import filters
 from catenary.postproc.evaluate.statistics import histogram
 from catenary.postproc.read.results import Results
@@ -51,7 +51,7 @@ def draw(folders: Folders, rows: Rows) -> list[StudyFigure]:
             for damping, trains in folders.items()
         }
         if any(shown.values()):
-            figures += [_uplift(shown), _droppers(shown)]
+            figures += [_passages(shown, *one) for one in _PASSED]
         figures += [_by_separation(13, LIGHT, rows), _by_separation(14, AVERAGE, rows)]
     return figures
 
@@ -79,8 +79,8 @@ def _filtered(results: Results) -> list[tuple[str, np.ndarray, np.ndarray]]:
 @figures.own_style()
 def _forces(folders: Folders) -> StudyFigure:
     trains = list(dict.fromkeys(train for own in folders.values() for train in own))
-    figure = figures.new_figure(0.6 + 1.55 * len(trains))
-    grid = figure.subplots(len(trains), 2, sharey=True, squeeze=False)
+    n = len(trains)
+    figure, grid = figures.panels(0.6 + 1.55 * n, n, 2, sharey=True, squeeze=False)
     columns: Columns = {}
     for column, (damping, own) in enumerate(folders.items()):
         for row, train in enumerate(trains):
@@ -107,8 +107,7 @@ def _force_panel(axes: Axes, folder: Path, train: str, damping: str, columns: Co
 @figures.own_style()
 def _overview(rows: Rows) -> StudyFigure:
     """Figure 9: statistics of all pantographs, a panel for each damping."""
-    figure = figures.new_figure(6.4)
-    panels = figure.subplots(2, 1)
+    figure, panels = figures.panels(6.4, 2, 1)
     columns: Columns = {"damping": [], "pantograph": []}
     columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}
     for axes, damping in zip(panels, _PANELS, strict=True):
@@ -133,8 +132,7 @@ def _overview(rows: Rows) -> StudyFigure:
 @figures.own_style()
 def _histograms(folders: Folders) -> StudyFigure:
     """Figure 10: share of time in bins of the contact force, a panel for each damping."""
-    figure = figures.new_figure(6.4)
-    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    figure, panels = figures.panels(6.4, 2, 1, sharex=True, sharey=True)
     columns: Columns = {}
     for axes, (damping, trains) in zip(panels, folders.items(), strict=True):
         for number, (train, folder) in enumerate(trains.items()):
@@ -154,45 +152,39 @@ def _histograms(folders: Folders) -> StudyFigure:
     return StudyFigure("figure_10", "Figure 10: histograms of the contact force.", figure, columns)
 
 
-def _uplift(shown: Folders) -> StudyFigure:
-    """Figure 11: uplift at the arm nearest to the middle of the stretch."""
-
-    def record(results: Results) -> tuple[float, np.ndarray]:
-        x = results.line("arm_x")
-        arm = int(np.argmin(np.abs(x - np.mean(results.evaluation))))
-        return float(x[arm]), 1e3 * results.column("arm_uplift", arm)
-
-    return _passages(
-        shown, record, "figure_11", "uplift [mm]",
-        "Figure 11: uplift at the steady arm in the middle of the stretch.",
-    )  # fmt: skip
+def _arm(results: Results) -> tuple[float, np.ndarray]:
+    """Place of the arm nearest to the middle of the stretch [m], and its uplift [mm]."""
+    x = results.line("arm_x")
+    arm = int(np.argmin(np.abs(x - np.mean(results.evaluation))))
+    return float(x[arm]), 1e3 * results.column("arm_uplift", arm)
 
 
-def _droppers(shown: Folders) -> StudyFigure:
-    """Figure 12: force of a dropper next to the middle of the span in the stretch's middle."""
+def _dropper(results: Results) -> tuple[float, np.ndarray]:
+    """Place of a dropper next to the middle of the span in the stretch's middle [m], and its force
+    [N]."""
+    x, span = results.line("dropper_x"), results.line("dropper_span")
+    chosen = int(np.flatnonzero(mid_span(results) & (span == results.reference_span))[0])
+    return float(x[chosen]), results.column("dropper_force", chosen)
 
-    def record(results: Results) -> tuple[float, np.ndarray]:
-        x, span = results.line("dropper_x"), results.line("dropper_span")
-        chosen = np.flatnonzero(mid_span(results) & (span == results.reference_span))
-        return float(x[chosen[0]]), results.column("dropper_force", int(chosen[0]))
 
-    return _passages(
-        shown, record, "figure_12", "dropper force [N]",
-        "Figure 12: force of a mid-span dropper in the middle of the stretch; 0 is slack.",
-    )  # fmt: skip
+# Figures over the time since the head has passed: number, record, its quantity, and caption.
+_PASSED = (
+    (11, _arm, "uplift [mm]", "uplift at the steady arm in the middle of the stretch."),
+    (12, _dropper, "dropper force [N]",
+     "force of a mid-span dropper in the middle of the stretch; 0 is slack."),
+)  # fmt: skip
 
 
 @figures.own_style()
 def _passages(
     shown: Folders,
+    n: int,
     record: Callable[[Results], tuple[float, np.ndarray]],
-    name: str,
     what: str,
     caption: str,
 ) -> StudyFigure:
     """A record at one place of the line over the time since the leading head passed it."""
-    figure = figures.new_figure(5.6)
-    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    figure, panels = figures.panels(5.6, 2, 1, sharex=True, sharey=True)
     columns: Columns = {}
     for axes, (damping, trains) in zip(panels, shown.items(), strict=True):
         for number, (train, folder) in enumerate(trains.items()):
@@ -214,14 +206,13 @@ def _passages(
         figures.tidy(axes, "", what, _PANELS[damping])
     panels[-1].set_xlabel("time since the leading head has passed [s]; dashed: heads pass")
     figures.legend_above(panels[0], columns=2)
-    return StudyFigure(name, caption, figure, columns)
+    return StudyFigure(f"figure_{n}", f"Figure {n}: {caption}", figure, columns)
 
 
 @figures.own_style()
 def _by_separation(number: int, damping: str, rows: Rows) -> StudyFigure:
     """Figures 13 and 14: statistics over the separation beside the single pantograph's."""
-    figure = figures.new_figure(3.6)
-    panels = figure.subplots(1, 2, sharey=True)
+    figure, panels = figures.panels(3.6, 1, 2, sharey=True)
     own = [row for row in rows.rows if row["damping"] == damping]
     columns: Columns = {"pantograph": [], "train": []}
     columns |= {f"{name} [N]": [] for name, _ in _STATISTICS}

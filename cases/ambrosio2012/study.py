@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from catenary.cases.studies.paper.runs import PaperStudy
+from catenary.cases.studies.paper_study import PaperStudy
 
 if TYPE_CHECKING:
     from catenary.cases.scene.scene import Scene
@@ -35,6 +35,6 @@ def measure(results: Results) -> dict[str, Any]:
 def conclude(runs: Mapping[str, StudyRun]) -> Study:
     """Verdicts, search, ranking and figures of the runs that are done."""
     from catenary.cases.ambrosio2012 import figures
-    from catenary.cases.studies.paper.conclusion import conclude as draw_up
+    from catenary.cases.studies.paper_study import conclude as draw_up
 
     return draw_up(PaperStudy.read(TABLE), runs, figures.draw)

@@ -2,7 +2,7 @@
 
 A case folder may hold a ``study.py`` with three functions:
 
-- ``variants(scene, shortened)`` gives the ``StudyVariant`` s; it loads no backend;
+- ``variants(scene, shortened)`` gives the ``StudyVariant`` s; it starts neither MPI nor PETSc;
 - ``measure(results)`` takes plain figures from each run's result file;
 - ``conclude(runs)`` turns the runs by name into a ``postproc.report.study_report.Study``.
 
@@ -13,14 +13,15 @@ from __future__ import annotations
 
 import importlib.util
 import time
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from catenary.base.errors import InputError
+from catenary.base.errors import CatenaryError, InputError
 from catenary.base.parallel import on_root
 from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
@@ -99,12 +100,14 @@ def make_plan(case: str, overrides: Sequence[str] = (), shortened: bool = False)
     Raises
     ------
     InputError
-        If the case has no study, or if a scene of it is wrong.
+        If the case has no study, if that makes no runs, or if a scene of it is wrong.
     """
     path = find_study(case)
     module = _load(path)
     scene = load_scene(case, overrides, shortened)
-    planned: list[StudyVariant] = module.variants(scene, shortened)
+    planned: list[StudyVariant] = list(_said(path, module.variants, scene, shortened) or ())
+    if not planned or not all(isinstance(one, StudyVariant) for one in planned):
+        raise InputError(f"variants of {path} must give a list of StudyVariant, one at least")
     jobs = make_jobs(case, [each.variant for each in planned], overrides, shortened)
     kept = [
         replace(job, keep_results=each.keep_results)
@@ -114,11 +117,7 @@ def make_plan(case: str, overrides: Sequence[str] = (), shortened: bool = False)
 
 
 def run(
-    plan: Plan,
-    out_dir: Path,
-    comm: Any,
-    options: RunOptions = AS_USUAL,
-    part: Part | None = None,
+    plan: Plan, out_dir: Path, comm: Any, options: RunOptions = AS_USUAL, part: Part | None = None
 ) -> tuple[str | None, list[Ended]]:
     """Run what is not done yet, write the study's report; returns its text and the runs.
 
@@ -145,19 +144,21 @@ def run(
 def _measured(path: Path, results: Results) -> dict[str, Any]:
     """Figures that ``measure`` of a ``study.py`` takes from a result file; other processes load the
     program again, as no package has it."""
-    measured: dict[str, Any] = _load(path).measure(results)
+    measured: dict[str, Any] = _said(path, _load(path).measure, results)
     return measured
 
 
 def _conclude(plan: Plan, out_dir: Path, ended: Sequence[Ended], begin: float) -> str:
     from catenary.cases.studies.sweep import output as sweep_output
-    from catenary.postproc.report.study_report import verdict_text, write_study
+    from catenary.postproc.report.study_report import Study, verdict_text, write_study
 
     runs = {
         one.variant.name: StudyRun(one, job.scene, out_dir / RUNS / one.variant.name)
         for one, job in zip(ended, plan.jobs, strict=True)
     }
-    study = _load(plan.path).conclude(runs)
+    study = _said(plan.path, _load(plan.path).conclude, runs)
+    if not isinstance(study, Study):
+        raise InputError(f"conclude of {plan.path} must give a Study, of catenary.postproc.report")
     table = sweep_output.table_of(ended)
     wall = sum(one.wall for one in ended)
     facts = {
@@ -172,6 +173,27 @@ def _conclude(plan: Plan, out_dir: Path, ended: Sequence[Ended], begin: float) -
     listed = [str(path) for path in files if path.stem == "study"]
     remarks = sweep_output.remarks_of(ended)
     return "\n".join([verdict_text(study), "", *fact_lines, *remarks, "", *listed])
+
+
+def _said(path: Path, function: Callable[..., Any], *given: Any) -> Any:
+    """What a function of a ``study.py`` returns.
+
+    Raises
+    ------
+    InputError
+        If it fails.
+    """
+    try:
+        return function(*given)
+    except CatenaryError:
+        raise
+    except Exception as error:  # whatever a person's own file does wrong
+        frames = traceback.extract_tb(error.__traceback__)
+        line = max((n for n, one in enumerate(frames) if one.filename == str(path)), default=0)
+        raise InputError(
+            f"{function.__name__} of {path} fails in line {frames[line].lineno}: "
+            f"{type(error).__name__}: {error}"
+        ) from error
 
 
 def _load(path: Path) -> ModuleType:

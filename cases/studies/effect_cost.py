@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,16 +28,11 @@ from catenary.cases.scene.input.case_files import Assigned
 from catenary.cases.scene.input.faults import shown_word
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene, end_of, problem_of
-from catenary.cases.studies.sweep.jobs import (
-    Ended,
-    Job,
-    RunOptions,
-    interrupted,
-    statistics_of,
-)
+from catenary.cases.studies.sweep.jobs import Job, RunOptions, interrupted, statistics_of
 from catenary.cases.studies.sweep.run_jobs import run_jobs
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.evaluate.wording import counted, fixed
+from catenary.postproc.files.disk import plain
 from catenary.postproc.report.study_table import Column, Content, StudyTable, remark_lines
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.problem.problem import Problem, steps_of
@@ -50,25 +46,23 @@ _NO_DATA = "the scene has no data for it"
 AS_IT_IS = "as-it-is"
 # Steps of a round at least, some milliseconds, and at most; a span between them.
 _FEWEST, _MOST = 200, 4000
-# The statistics that are compared, of a pantograph and of the line.
-FIGURES = ("mean_N", "std_N", "max_N", "min_N")
+# The statistics that are compared, of a pantograph and of the line: heads of their columns, and
+# their names in sentences.
 UPLIFT = "max_uplift_mm"
+_FIGURES = {
+    "mean_N": ("mean", "the mean"),
+    "std_N": ("sigma", "sigma"),
+    "max_N": ("max", "the maximum"),
+    "min_N": ("min", "the minimum"),
+    UPLIFT: ("uplift", "the uplift"),
+}
 TABLE, RECORD, TEXT = "cost.csv", "cost.json", "cost.txt"
 # In the column "simulated": the scene simulates the effect.
 LEFT_OUT = "left out"
-# Heads of the figures in a table, and their names in sentences.
-_HEADS = {"mean_N": "mean", "std_N": "sigma", "max_N": "max", "min_N": "min", UPLIFT: "uplift"}
 # A ratio of times that is none: what clocks and caches make of equal steps.
 _SAME_COST = 0.03
 # A share of a figure below which digits are noise of no use to anybody.
 _NOTHING = 5e-5
-_WORDS = {
-    "mean_N": "the mean",
-    "std_N": "sigma",
-    "max_N": "the maximum",
-    "min_N": "the minimum",
-    UPLIFT: "the uplift",
-}
 
 
 @dataclass(frozen=True)
@@ -331,9 +325,9 @@ def measure(
     scene = jobs[0].scene
     problem = problem_of(scene)
     first, n_steps = _round_of(problem)
-    runs: dict[str, tuple[Job, Ended]] = {
-        one.variant.name: (job, one) for job, one in zip(jobs[1:], others, strict=True)
-    }
+    outcomes = refused | {one.variant.name: one.outcome for one in others}
+    pairs = zip(jobs[1:], others, strict=True)
+    done = {one.variant.name: (job.scene, one) for job, one in pairs if one.done}
     rows = []
     with (
         Phase(comm, "steps were timed", "runs are kept where -o names a folder") as phase,
@@ -343,12 +337,11 @@ def measure(
         for number, switch in enumerate(effects.switches, start=1):
             phase.next(f"steps without or with {switch.name} were timed")
             say(f"[{number}/{len(effects.switches)}] steps: {switch.name}")
-            job, one = runs.get(switch.name, (None, None))
-            if job is None or one is None or not one.done:
-                outcome = refused[switch.name] if one is None else one.outcome
-                rows.append(Measured(switch, outcome))
+            if switch.name not in done:
+                rows.append(Measured(switch, outcomes[switch.name]))
                 continue
-            with RepeatedMarch(comm, rest_of(job.scene), first, n_steps) as march:
+            own_scene, one = done[switch.name]
+            with RepeatedMarch(comm, rest_of(own_scene), first, n_steps) as march:
                 timed, own = beside(march, as_it_is, options.rounds), march.size
             figures = statistics_of(one.summary)
             rows.append(Measured(switch, "done", own, timed.ratio, figures, one.remarks))
@@ -379,7 +372,7 @@ class Size(NamedTuple):
     planes: tuple[int, ...]
 
 
-class RepeatedMarch:
+class RepeatedMarch(AbstractContextManager["RepeatedMarch"]):
     """A march over some steps that starts again and again from one of its states.
 
     Collective to make. A context manager that destroys the march.
@@ -427,9 +420,6 @@ class RepeatedMarch:
     def destroy(self) -> None:
         """Collective."""
         self._march.destroy()
-
-    def __enter__(self) -> RepeatedMarch:
-        return self
 
     def __exit__(self, *error: object) -> None:
         self.destroy()
@@ -498,19 +488,6 @@ class Change(NamedTuple):
     share: float
 
 
-def _changes(found: Costs, row: Measured) -> list[Change]:
-    """Changes of all figures of all pantographs by the switch of a ``row``; unknown figures are
-    left out."""
-    result = []
-    pairs = zip(found.as_it_is.figures, row.figures, strict=False)
-    for number, (before, after) in enumerate(pairs):
-        for name in (*FIGURES, UPLIFT):
-            share = _share(before, after, name)
-            if share is not None:
-                result.append(Change(name, number, share))
-    return result
-
-
 def _share(before: dict[str, Any], after: dict[str, Any], name: str) -> float | None:
     a, b = before[name], after[name]
     if a is None and b is None:
@@ -522,8 +499,16 @@ def _share(before: dict[str, Any], after: dict[str, Any], name: str) -> float | 
 
 
 def _largest(found: Costs, row: Measured) -> Change | None:
-    """The largest change by the switch of a ``row``, None without figures."""
-    return max(_changes(found, row), key=lambda change: abs(change.share), default=None)
+    """The largest change of a figure of a pantograph by the switch of a ``row``, None if no figure
+    is known."""
+    pairs = enumerate(zip(found.as_it_is.figures, row.figures, strict=False))
+    changes = (
+        Change(name, number, share)
+        for number, (before, after) in pairs
+        for name in _FIGURES
+        if (share := _share(before, after, name)) is not None
+    )
+    return max(changes, key=lambda change: abs(change.share), default=None)
 
 
 def advice(found: Costs, row: Measured) -> str:
@@ -555,7 +540,7 @@ def _price(cost: float) -> str:
 
 def _words(found: Costs, change: Change) -> str:
     whose = f" of {found.names[change.pantograph]}" if len(found.names) > 1 else ""
-    what = _WORDS[change.figure] + (whose if change.figure != UPLIFT else "")
+    what = _FIGURES[change.figure][1] + (whose if change.figure != UPLIFT else "")
     if math.isinf(change.share):
         return f"{what} comes or goes"
     if abs(change.share) < _NOTHING:
@@ -610,39 +595,36 @@ def table_of(found: Costs) -> StudyTable:
 
     People read rows of the leading pantograph, with changes of its figures.
     """
-    names = (*FIGURES, UPLIFT)
-    changed = [part for name in names for part in (name, f"change_of_{name}")]
+    changed = [part for name in _FIGURES for part in (name, f"change_of_{name}")]
     files = ["effect", "simulated", "together", "outcome", "n_unknowns", "unknowns_of_a_station"]
     files += ["pantograph", *changed, "us_per_step", "cost", "from_m", "to_m", "advice", "remarks"]
     people = [
-        Column("run", "run"),
-        Column("n_unknowns", "unknowns", "d"),
-        Column("unknowns_of_a_station", "station", ">"),
-        Column("us_per_step", "us/step", ".1f"),
-        Column("cost", "cost", ".2f"),
-        *(Column(f"shown_{name}", _HEADS[name], ">") for name in names),
+        ("run", "run", ""),
+        ("n_unknowns", "unknowns", "d"),
+        ("unknowns_of_a_station", "station", ">"),
+        ("us_per_step", "us/step", ".1f"),
+        ("cost", "cost", ".2f"),
+        *((f"shown_{name}", head, ">") for name, (head, _) in _FIGURES.items()),
     ]
-    columns = [*map(Column, files), *(one._replace(in_files=False) for one in people)]
+    columns = [*map(Column, files), *(Column(*one, in_files=False) for one in people)]
     rows = [row for one in (found.as_it_is, *found.rows) for row in _rows(found, one)]
     return StudyTable(columns, rows)
 
 
 def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     """The rows of a switch, or of the scene as it is, one of each pantograph."""
-    switch, size, step = one.switch, one.size, found.step * one.ratio
-    simulated = "as it is"
-    if switch.name:
-        simulated = LEFT_OUT if switch.on else "switched on"
+    switch, size = one.switch, one.size
+    switched = LEFT_OUT if switch.on else "switched on"
     head: dict[str, Any] = {
         "run": _run(one),
         "effect": switch.name,
-        "simulated": simulated,
+        "simulated": switched if switch.name else "as it is",
         "together": list(switch.together),
         "outcome": one.outcome,
-        "n_unknowns": None if size is None else size.n_unknowns,
-        "unknowns_of_a_station": "" if size is None else width_text(size),
-        "us_per_step": None if math.isnan(step) else step,
-        "cost": None if not (switch.name and one.done) else one.cost,
+        "n_unknowns": size and size.n_unknowns,
+        "unknowns_of_a_station": width_text(size) if size else "",
+        "us_per_step": plain(found.step * one.ratio),
+        "cost": one.cost if switch.name and one.done else None,
         "from_m": found.stretch[0],
         "to_m": found.stretch[1],
         "advice": _sentence(found, one) if switch.name else "",
@@ -651,7 +633,7 @@ def _rows(found: Costs, one: Measured) -> list[dict[str, Any]]:
     rows = []
     for number, own in enumerate(one.figures or [{}]):
         row = {**head, "pantograph": found.names[number] if one.figures else ""}
-        for name in (*FIGURES, UPLIFT):
+        for name in _FIGURES:
             value, first = own.get(name), found.as_it_is.figures[number][name]
             change = None if value is None or first is None else value - first
             shown = None if change is None else f"{change:+.2f}"

@@ -57,19 +57,8 @@ from catenary.postproc.report.page import (
     Text,
     number,
 )
+from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.pictures.along_track import mark_line
-from catenary.postproc.report.pictures.figures import (
-    COLOURS,
-    LIMIT,
-    WORST,
-    FewTicks,
-    colour,
-    legend_above,
-    new_figure,
-    own_style,
-    stacked,
-    tidy,
-)
 from catenary.postproc.report.report import SECTIONS
 from catenary.postproc.report.sections import dynamics, run_facts
 from catenary.postproc.report.sections.run_facts import INPUT
@@ -163,10 +152,8 @@ def measured_errors(scene: Scene, folder: Path) -> dict[str, float]:
     own = [
         row
         for row in rows
-        if row["outcome"] == "done"
-        and row["elements_per_gap"] == elements
-        and row["dt_s"] is not None
-        and abs(row["dt_s"] / dt - 1.0) < 1e-9
+        if (row["outcome"], row["elements_per_gap"]) == ("done", elements)
+        and abs((row["dt_s"] or 0.0) / dt - 1.0) < 1e-9
     ]
     if not own:
         raise InputError(
@@ -305,26 +292,20 @@ def _hardware(problem: Problem) -> Iterator[list[Any]]:
         yield [f"droppers, {joined}", len(group.lower_x), _of_dropper(group.kind)]
     for arms in line.steady_arms:
         kind = arms.kind
+        stop, held = kind.uplift_stop, stiffness_words(kind.stop_stiffness)
         known = [
             (kind.length, f"{kind.length:g} m"),
             (kind.mass_per_length, f"{kind.mass_per_length:g} kg/m"),
             (kind.clamp_mass, f"clamp {kind.clamp_mass:g} kg"),
             (kind.by_radial_force, "vertical stiffness radial force over length"),
             (kind.stiffness, f"vertical stiffness {stiffness_words(kind.stiffness)}"),
+            (stop is not None, f"stop at {1e3 * (stop or 0.0):g} mm with {held}"),
         ]
-        parts = [text for value, text in known if value]
-        if kind.uplift_stop is not None:
-            stop = (
-                f"stop at {1e3 * kind.uplift_stop:g} mm with {stiffness_words(kind.stop_stiffness)}"
-            )
-            parts.append(stop)
-        yield [f"steady arms on {wire_words(arms.wire)}", len(arms.x), ", ".join(parts)]
+        parts = ", ".join(text for value, text in known if value)
+        yield [f"steady arms on {wire_words(arms.wire)}", len(arms.x), parts]
     for supports in line.supports:
-        yield [
-            f"supports of {wire_words(supports.wire)}",
-            len(supports.x),
-            f"stiffness {stiffness_words(supports.stiffness)}",
-        ]
+        held = f"stiffness {stiffness_words(supports.stiffness)}"
+        yield [f"supports of {wire_words(supports.wire)}", len(supports.x), held]
     for clamps in line.clamps:
         joined = f"{wire_words(clamps.upper)} to {wire_words(clamps.lower)}"
         held = f"stiffness {stiffness_words(clamps.stiffness)}, {clamps.mass:g} kg"
@@ -406,9 +387,7 @@ def _pantographs_section(scene: SceneOfRun, run: EvaluatedRun) -> Section:
     return Section("Data sheet of the pantographs", _pantograph_blocks(kinds), pictures)
 
 
-def _pantograph_blocks(
-    kinds: dict[str, tuple[Placement, str]],
-) -> Iterator[Text | StudyTable]:
+def _pantograph_blocks(kinds: dict[str, tuple[Placement, str]]) -> Iterator[Text | StudyTable]:
     for name, (placement, description) in kinds.items():
         yield Text(f"{description}.", "", f"{_spaced(name)}:")
         data = placement.data
@@ -425,42 +404,36 @@ def _pantograph_blocks(
                     for body in data.system.bodies]  # fmt: skip
             heads = ["body", "mass [kg]", "Ixx [kg m²]", "Iyy [kg m²]", "Izz [kg m²]"]
             yield texts_table(heads, rows, {1, 2, 3, 4})
-        strips = data.strips
-        rows = [["collector strips", str(strips.number), ""]]
-        if strips.number > 1:
-            rows.append(["distance of the strips", number(strips.spacing, 3), "m"])
-        if strips.length is not None:
-            rows.append(["length of a strip", number(strips.length, 3), "m"])
-        if strips.suspension is not None:
-            own = strips.suspension
-            rows += [
-                ["mass of a strip", f"{own.mass:g}", "kg"],
-                ["stiffness below a strip", f"{own.stiffness:g}", "N/m"],
-                ["damping below a strip", f"{own.damping:g}", "N s/m"],
-            ]
-        yield texts_table(["head", "value", "unit"], rows, {1})
+        strips, own = data.strips, data.strips.suspension
+        head = [
+            ("collector strips", str(strips.number), ""),
+            ("distance of the strips", strips.number > 1 and number(strips.spacing, 3), "m"),
+            ("length of a strip", strips.length is not None and number(strips.length, 3), "m"),
+            ("mass of a strip", own and f"{own.mass:g}", "kg"),
+            ("stiffness below a strip", own and f"{own.stiffness:g}", "N/m"),
+            ("damping below a strip", own and f"{own.damping:g}", "N s/m"),
+        ]
+        known = [row for row in head if row[1]]
+        yield texts_table(["head", "value", "unit"], known, {1})
 
 
-@own_style()
+@figures.own_style()
 def _draw_pantograph(data: Any) -> Figure:
     """A pantograph from the side and from the front, heights above its base."""
     shape = shape_of(data)
     n_places = data.n_masses if isinstance(data, LumpedData) else 1
     rest = shape.pose(np.full(n_places, shape.below), 0.0, shape.below, shape.below).rest
-    figure = new_figure(3.6)
     wide = np.ptp(rest[:, :2], axis=0) + 0.3  # both to one scale
-    panels = figure.subplots(1, 2, sharey=True, width_ratios=wide.tolist())
+    figure, panels = figures.panels(3.6, 1, 2, sharey=True, width_ratios=wide.tolist())
     labels = "along the track [m]", "to the left [m]"
+    looks = {HEAD: (figures.COLOURS[1], 2.2), SPRING: (figures.COLOURS[0], 1.3)}
     for axes, across, label in zip(panels, (0, 1), labels, strict=True):
-        for kind, (first, second) in zip(shape.kinds, shape.cells, strict=True):
-            ends = rest[[first, second]]
-            tone = COLOURS[1] if kind == HEAD else COLOURS[0] if kind == SPRING else "#222222"
-            axes.plot(
-                ends[:, across], ends[:, 2], color=tone, linewidth=2.2 if kind == HEAD else 1.3
-            )
+        for kind, cell in zip(shape.kinds, shape.cells, strict=True):
+            ends, (tone, width) = rest[list(cell)], looks.get(kind, ("#222222", 1.3))
+            axes.plot(ends[:, across], ends[:, 2], color=tone, linewidth=width)
         axes.set_aspect("equal", adjustable="datalim")
-        axes.xaxis.set_major_locator(FewTicks(4))
-        tidy(axes, label, "height [m]" if across == 0 else "")
+        axes.xaxis.set_major_locator(figures.FewTicks(4))
+        figures.tidy(axes, label, "height [m]" if across == 0 else "")
     return figure
 
 
@@ -516,7 +489,7 @@ def _worst_pictures(results: Results, places: WorstPlaces) -> Iterator[Picture]:
             yield Picture(name, caption, partial(_draw_passage, results, spot))
 
 
-@own_style()
+@figures.own_style()
 def _draw_span(results: Results, passage: Passage) -> Figure:
     """Contact force, and height of the contact point, in a span with those beside it."""
     length = passage.end - passage.start
@@ -524,17 +497,17 @@ def _draw_span(results: Results, passage: Passage) -> Figure:
     p = passage.pantograph
     position = results.column("contact_position", p)
     rows = slice(*np.searchsorted(position, (low, high)).tolist())
-    figure, (force, height) = stacked(4.8, 2)
+    figure, (force, height) = figures.stacked(4.8, 2)
     raw = results.column("contact_force", p)
     filtered = filters.contact_force(results, p)[rows]
     for axes in (force, height):
         mark_line(axes, results, low, high, named=axes is force)
         label = "worst span" if axes is force else None
-        axes.axvspan(passage.start, passage.end, color=WORST, zorder=0.5, label=label)
+        axes.axvspan(passage.start, passage.end, color=figures.WORST, zorder=0.5, label=label)
     x = position[rows]
-    light: dict[str, Any] = {"color": colour(p), "alpha": 0.35, "linewidth": 0.7}
+    light: dict[str, Any] = {"color": figures.colour(p), "alpha": 0.35, "linewidth": 0.7}
     force.plot(x, raw[rows], label="unfiltered", **light)
-    force.plot(x, filtered, color=colour(p), linewidth=1.6, label="20 Hz low-pass")
+    force.plot(x, filtered, color=figures.colour(p), linewidth=1.6, label="20 Hz low-pass")
     for which, word, offset in ((np.argmax, "largest", (6, 4)), (np.argmin, "smallest", (6, -12))):
         within = np.flatnonzero((x >= passage.start) & (x <= passage.end))
         at = int(within[which(filtered[within])])
@@ -543,19 +516,21 @@ def _draw_span(results: Results, passage: Passage) -> Figure:
             xytext=offset, textcoords="offset points", fontsize=8,
             bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip
-        force.plot(x[at], filtered[at], "o", color=LIMIT, ms=4)
-    force.axhline(0.0, color=LIMIT, linewidth=0.9)
+        force.plot(x[at], filtered[at], "o", color=figures.LIMIT, ms=4)
+    force.axhline(0.0, color=figures.LIMIT, linewidth=0.9)
     force.margins(y=0.25)  # for what is written at the extremes
-    tidy(force, "", "contact force [N]")
-    legend_above(force)
+    figures.tidy(force, "", "contact force [N]", legend=True)
     line = results.column("wire_height", p)[rows]
-    height.plot(x, line, color=COLOURS[2], linewidth=1.3, label="contact wire at the pantograph")
-    tidy(height, "position of the pantograph along the track [m]", "height [m]")
-    legend_above(height)
+    height.plot(
+        x, line, color=figures.COLOURS[2], linewidth=1.3, label="contact wire at the pantograph"
+    )
+    figures.tidy(
+        height, "position of the pantograph along the track [m]", "height [m]", legend=True
+    )
     return figure
 
 
-@own_style()
+@figures.own_style()
 def _draw_passage(results: Results, spot: Spot) -> Figure:
     """Force of a dropper over the place of the leading pantograph."""
     leader = int(np.argmax(results.first_position))
@@ -566,19 +541,20 @@ def _draw_passage(results: Results, spot: Spot) -> Figure:
     n_rows = results.n_rows("dropper_force")
     rows = slice(*np.clip(np.searchsorted(place, reach), 0, n_rows).tolist())
     force, x = results.column("dropper_force", spot.number, rows), place[rows] - spot.x
-    figure, (axes,) = stacked(3.0, 1)
+    figure, (axes,) = figures.stacked(3.0, 1)
     axes.plot(x, force, color="#222222", linewidth=1.4, label="force")
     for p, name in enumerate(results.pantograph_names()):
         label = f"{name} passes"
-        axes.axvline(behind[p], color=colour(p), linestyle="--", linewidth=1.1, label=label)
+        axes.axvline(behind[p], color=figures.colour(p), linestyle="--", linewidth=1.1, label=label)
     slack = force <= 0.0
     if slack.any():
-        axes.plot(x[slack], force[slack], ".", color=LIMIT, ms=3, label="slack")
+        axes.plot(x[slack], force[slack], ".", color=figures.LIMIT, ms=3, label="slack")
     axes.axhline(0.0, color="#6b6b6b", linewidth=0.7)
     axes.margins(x=0.0)
     who = "leading pantograph" if results.n_pantographs > 1 else "pantograph"
-    tidy(axes, f"position of the {who} relative to the dropper [m]", "dropper force [N]")
-    legend_above(axes)
+    figures.tidy(
+        axes, f"position of the {who} relative to the dropper [m]", "dropper force [N]", legend=True
+    )
     return figure
 
 
@@ -616,9 +592,9 @@ def _validation_section(statement: Mapping[str, Any] | None, run: EvaluatedRun) 
             "through the steps of EN 50318; `catenary report --validation STUDY` shows them here."
         )
         return Section(_HEADING, [Text(text)])
-    figures = statement["figures"]
-    title = f"Judged figures ({len(figures)})"
-    folded = [Folded(title, readers_table(figures, ""))] if figures else []
+    judged = statement["figures"]
+    title = f"Judged figures ({len(judged)})"
+    folded = [Folded(title, readers_table(judged, ""))] if judged else []
     return Section(_HEADING, _statement_blocks(statement, run), folded=folded)
 
 
@@ -632,8 +608,7 @@ def _statement_blocks(
         yield Text(f"It is not one of the program of this run, {made_by}.", "remark")
     rows = [[number, *step] for number, step in enumerate(statement["steps"], start=1)]
     yield texts_table(["", "step", "result"], rows, {0})
-    failed = [row for row in statement["figures"] if row["verdict"] == FAILED]
-    if failed:
+    if failed := [row for row in statement["figures"] if row["verdict"] == FAILED]:
         yield readers_table(failed, "Figures beyond their limits")
     yield Text(" ".join(statement["closing"]))
 
@@ -695,14 +670,5 @@ def full_sections(
             behind["above"] = [SectionEntry("pantographs", sheet, full=True)]
     behind["run"] = [SectionEntry("validation", partial(_validation_section, statement), full=True)]
     last = SectionEntry("signatures", partial(run_facts.signatures, text), full=True)
-    return [
-        *(
-            one
-            for entry in SECTIONS
-            for one in (
-                effects if entry.name == effects.name else entry,
-                *behind.get(entry.name, ()),
-            )
-        ),
-        last,
-    ]
+    usual = [effects if entry.name == effects.name else entry for entry in SECTIONS]
+    return [one for entry in usual for one in (entry, *behind.get(entry.name, ()))] + [last]

@@ -78,6 +78,11 @@ class _Signal(_Column):
     noise: POSITIVE | None = None
     bias: _NOT_NEGATIVE = 0.0
 
+    def in_si(self, table: pd.DataFrame, path: str) -> tuple[np.ndarray, float, float]:
+        """Values (n,), NaN where there is none, noise and bias of a table's column."""
+        values = column_of(table, path, self.column, may_lack=True) * self.factor
+        return values, (self.noise or 0.0) * self.factor, self.bias * self.factor
+
 
 class Force(_Signal):
     """The column of contact forces; ``noise`` and ``bias`` in its unit."""
@@ -406,19 +411,12 @@ def passage_of(
     for number, force in columns:
         start = _start(results, number - 1) if own.time is not None else 0.0
         places = places_of(table, str(path), own, results.fact("speed"), start)
-        values = column_of(table, str(path), force.column, may_lack=True) * force.factor
-        height, height_noise, height_bias = None, 0.0, 0.0
-        if own.head_height is not None and number == own.pantograph:
-            signal = own.head_height
-            height = column_of(table, str(path), signal.column, may_lack=True) * signal.factor
-            height_noise = (signal.noise or 0.0) * signal.factor
-            height_bias = signal.bias * signal.factor
-        noise, bias = (force.noise or 0.0) * force.factor, force.bias * force.factor
-        forces.append(
-            MeasuredForce(
-                number - 1, places, values, height, noise, height_noise, bias, height_bias
-            )
-        )
+        values, noise, bias = force.in_si(table, str(path))
+        signal = own.head_height if number == own.pantograph else None
+        of_head = (None, 0.0, 0.0) if signal is None else signal.in_si(table, str(path))
+        height, of_noise, of_bias = of_head
+        one = MeasuredForce(number - 1, places, values, height, noise, of_noise, bias, of_bias)
+        forces.append(one)
     begin, end = results.evaluation
     return Passage(
         path.name,

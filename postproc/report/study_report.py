@@ -10,15 +10,16 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from catenary.postproc.files.csv_text import csv_text, number_text
 from catenary.postproc.report.page import Folded, Picture, Section, page
-from catenary.postproc.report.pictures import figures
 from catenary.postproc.report.study_table import StudyTable, texts_table, write_files
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "cannot be decided"
 
@@ -97,6 +98,8 @@ def write_study(
     facts : mapping
         What is said of the study as a whole, such as its run time.
     """
+    from catenary.postproc.report.pictures import figures
+
     pictures: dict[str, bytes] = {}
     for one in study.figures:
         pictures |= figures.painted(one.name, partial(getattr, one, "figure"))

@@ -49,33 +49,31 @@ def test_references_are_finer_than_all_levels_in_all_that_is_refined() -> None:
     scene = load_scene(CASE)
     for quick in (False, True):
         for axis in AXES.values():
-            if axis.reference is None:
+            if axis.chains is None:
                 continue
-            finest = axis.reference(quick).level
+            finest = axis.chains(quick)[0][0]
             for level in axis.chosen(scene, quick):
-                for name, size in level.sizes:
-                    assert size > (finest.size(name) or 0.0), axis.name
+                for name, size in level.sizes.items():
+                    assert size > finest.sizes.get(name, 0.0), axis.name
         grid = AXES["grid"]
-        assert grid.reference is not None
-        assert {name for name, _ in grid.reference(quick).level.sizes} == {"dt", "h"}
+        assert grid.chains is not None
+        assert grid.chains(quick)[0][0].sizes.keys() == {"dt", "h"}
 
 
 def test_the_reference_is_measured_by_ones_of_half_its_fineness() -> None:
     for quick in (False, True):
         for axis in AXES.values():
-            if axis.reference is None:
+            if axis.chains is None:
                 continue
-            pair = axis.reference(quick)
-            refined = [name for name, _ in pair.level.sizes]
-            assert len(pair.chains) == len(refined)
-            for chain in pair.chains:
-                (own,) = {name for level in chain for name, size in level.sizes if size} & {
-                    name for name in refined if chain[0].size(name) != chain[1].size(name)
-                }
-                assert chain[0].size(own) == pair.level.size(own)
-                sizes = [level.size(own) for level in chain]
+            chains = axis.chains(quick)
+            finest = chains[0][0].sizes
+            assert len(chains) == len(finest)
+            for first, second, third in chains:
+                (own,) = (name for name in finest if first.sizes[name] != second.sizes[name])
+                assert first.sizes[own] == finest[own]
+                sizes = [level.sizes[own] for level in (first, second, third)]
                 assert sizes == pytest.approx([sizes[0], 2 * sizes[0], 4 * sizes[0]])
-                others = [[one for one in level.sizes if one[0] != own] for level in chain]
+                others = [{**level.sizes, own: None} for level in (first, second, third)]
                 assert others[0] == others[1] == others[2]
 
 

@@ -52,7 +52,7 @@ def excited(folder: Path, kind: str, settings: Excited, *words: str) -> WavesSee
 
     def watching(rest: LineAtRest) -> list[Watch]:
         seen.append(WireMotion(rest.model.contact_nodes, rest.model.contact_x))
-        return [Watch(round(EVERY / problem.numerics.dt), seen)]
+        return [Watch(round(EVERY / problem.numerics.dt), [seen[0].add])]
 
     run = ExcitedRun(without_train(problem, excitation), excitation, EVERY, watching)
     done = run_case(scene, folder, MPI.COMM_SELF, only_summary=True, excited=run)

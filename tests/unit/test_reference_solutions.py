@@ -316,6 +316,11 @@ def stretch(force: str) -> str:
         ),
         ("of,quantity,value\n", ONE, "has no rows: it gives no statistics"),
         (
+            f"configuration,of,quantity,value\n{ONE},line,max_uplift_mm,70\n,line,max_uplift_mm,70\n",
+            None,
+            'given.csv has nothing in column "configuration", row 2 below its names',
+        ),
+        (
             f"configuration,of,quantity,value\n{TWO},line,max_uplift_mm,70\n",
             ONE,
             f"has statistics of {TWO}, and --of names {ONE}: leave --of away",

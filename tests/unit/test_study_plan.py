@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from verb_runner import invoke
 from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE, variants
 from catenary.cases.studies.case_study import StudyVariant, make_plan
-from catenary.cases.studies.paper.runs import PaperStudy, changes_of
+from catenary.cases.studies.paper_study import PaperStudy, changes_of
 from catenary.postproc.report.study_report import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -29,6 +30,19 @@ from catenary.postproc.report.study_report import (
 )
 
 pytestmark = pytest.mark.usefixtures("quick_reports")
+
+
+# What its functions return but `conclude`, which returns nothing.
+OWN_STUDY = """from catenary.cases.studies.case_study import StudyVariant
+from catenary.cases.studies.sweep.variants import Variant
+def variants(scene, shortened):
+    return {}
+def measure(results):
+    return {}
+def conclude(runs):
+    pass
+"""
+RUNS_ONCE = '[StudyVariant(Variant("a", ()))]'
 
 
 def own_case(folder: Path, study: str) -> Path:
@@ -60,11 +74,31 @@ def test_a_study_has_no_options_of_a_run(option: str, tmp_path: Path) -> None:
         ("def variants(scene, shortened): ...\n", "has no function measure"),
         ("def variants(\n", "cannot be loaded: SyntaxError"),
         ("import no_such_module\n", "cannot be loaded: ModuleNotFoundError"),
+        (OWN_STUDY.format("[][1]", "{}"), "variants of .*study.py fails in line 4: IndexError: "),
+        (OWN_STUDY.format("[]", "{}"), "variants of .*study.py must give a list of StudyVariant, "),
+        (
+            OWN_STUDY.format("[1]", "{}"),
+            "variants of .*study.py must give a list of StudyVariant, ",
+        ),
     ],
 )
 def test_a_study_that_cannot_be_used_is_told(study: str, sentence: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=sentence):
         make_plan(str(own_case(tmp_path, study)))
+
+
+@pytest.mark.parametrize(
+    ("measured", "sentence"),
+    [("{}['x']", "measure of .*study.py fails in line 6: KeyError: 'x'"),
+     ("{}", "conclude of .*study.py must give a Study")],
+)  # fmt: skip
+def test_what_a_study_makes_of_its_runs_may_fail(
+    measured: str, sentence: str, tmp_path: Path
+) -> None:
+    """It ended in a traceback."""
+    case = own_case(tmp_path, OWN_STUDY.format(RUNS_ONCE, measured))
+    done = invoke("run", str(case), "--study", "--short", "-o", str(tmp_path / "out"))
+    assert done.exit_code == 2 and re.search(sentence, done.stderr)
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ from small_lines import BARE, bare_wires, mesh_of, problem_of
 
 from catenary import InputError
 from catenary.cases.ambrosio2012.study import TABLE
-from catenary.cases.studies.paper import conclusion
-from catenary.cases.studies.paper.runs import PaperStudy, Rows
+from catenary.cases.studies import paper_study as conclusion
+from catenary.cases.studies.paper_study import PaperStudy, Rows
 from catenary.cases.studies.waves.theory import first_band
 from catenary.postproc.report.study_report import NOT_REPRODUCED, REPRODUCED, UNDECIDED
 from catenary.solver.effects.build_model import build

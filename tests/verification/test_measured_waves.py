@@ -26,7 +26,7 @@ from catenary.cases.studies.asked import Excited
 from catenary.cases.studies.waves.seen import (
     EnergyMotion,
     EnergySeen,
-    NodeMotion,
+    TakesMotion,
     WireMotion,
     arrived,
     measured_rows,
@@ -46,7 +46,7 @@ SPEED = EN_CONTACT_WIRE.wave_speed
 
 
 def march(
-    rest: LineAtRest, excitation: Excitation, every: float, seen: Sequence[NodeMotion]
+    rest: LineAtRest, excitation: Excitation, every: float, seen: Sequence[TakesMotion]
 ) -> None:
     """March to the end and show the motion each ``every`` seconds."""
     dt = rest.problem.numerics.dt
@@ -84,7 +84,7 @@ def test_group_velocities_of_a_periodic_line_are_those_of_its_bloch_waves() -> N
     struck = excitation_of("hammer", Excited(impulse=0.2), problem, 1e-3)
     rest = line_at_rest(without_train(problem, struck), mesh_of(line, 8))
     wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
-    march(rest, struck, 4e-3, [wire])
+    march(rest, struck, 4e-3, [wire.add])
     seen = wire.seen(lambda times: np.zeros((times.size, 0)), 22 * 60.0)
     theory = wave_theory(rest.problem, rest)
     found = measured_rows(theory, seen, transmitted(theory, seen))
@@ -128,7 +128,7 @@ def test_what_passes_lies_in_the_pass_bands() -> None:
     struck = excitation_of("hammer", Excited(impulse=0.2), problem, 1e-3)
     rest = line_at_rest(without_train(problem, struck), mesh_of(line, 4))
     wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
-    march(rest, struck, 4e-3, [wire])
+    march(rest, struck, 4e-3, [wire.add])
     seen = wire.seen(lambda times: np.zeros((times.size, 0)), 22 * 60.0)
     found = transmitted(wave_theory(rest.problem, rest), seen)
     assert found is not None and len(found.bands) > 8
@@ -159,7 +159,7 @@ def test_a_moving_force_sends_waves_by_doppler_and_energy_by_its_factor() -> Non
     moving = MovingForce(100.0, frequency, 500.0, speed, 0.5)
     rest = line_at_rest(without_train(problem, moving), mesh_of(line, 1200))
     motion, energy = WireMotion(rest.model.contact_nodes, rest.model.contact_x), EnergyMotion(rest)
-    march(rest, moving, 5e-3, [motion, energy])
+    march(rest, moving, 5e-3, [motion.add, energy.add])
     seen = motion.seen(lambda times: (500.0 + speed * times)[:, None])
     late = seen.time > 2.5
     found = []
@@ -261,7 +261,7 @@ def test_a_head_of_fixed_height_amplifies_an_oncoming_wave_by_the_doppler_factor
     problem = problem_of(line, BARE, train=course, contact=LinearLaw(1e6, 0.0))
     rest = line_at_rest(problem, mesh_of(line, 1800))
     motion = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
-    march(rest, Blow(struck, 0.2, 100.0, False), 2e-3, [motion])
+    march(rest, Blow(struck, 0.2, 100.0, False), 2e-3, [motion.add])
     seen = motion.seen(lambda times: (250.0 + speed * times)[:, None])
     # Half way between blow and head; what the blow sends to the far end is not back by then.
     station = int(np.argmin(np.abs(seen.x - 550.0)))

@@ -116,9 +116,9 @@ def test_a_tenth_more_than_the_limit_breaks_and_a_tenth_less_does_not(bench: Ben
     """The other way round: a limit that is wrong by a tenth would be noticed."""
     line = line_at(bench)
     stiffness, mass = 1e6, 2.0
-    both = theory.couple(line, head(mass))
+    both = theory.couple(line, head(mass), NEWMARK)
     for coupling in COUPLINGS[1:]:
-        limit = theory.largest_step(both, NEWMARK, stiffness, coupling, (1e-5, 0.025))
+        limit = both.largest_step(stiffness, coupling, (1e-5, 0.025))
         assert bench.is_stable(coupling, stiffness, mass, 0.9 * limit)
         assert not bench.is_stable(coupling, stiffness, mass, 1.1 * limit)
 
@@ -131,15 +131,16 @@ def test_a_line_as_a_point_sees_it_is_the_line(bench: Bench) -> None:
     load = theory.loads_at(wire, bench.x, model.n_dofs)
     mass, stiffness, damping = (part.toarray() for part in theory.matrices(model))
     line = line_at(bench)
-    step = theory.Step(2e-3, NEWMARK)
+    dt = 2e-3
     whole = theory.Coupled(
         linalg.block_diag(mass, np.diag(EN_PANTOGRAPH.masses)),
         linalg.block_diag(stiffness, EN_PANTOGRAPH.chain(EN_PANTOGRAPH.stiffnesses)),
         linalg.block_diag(damping, EN_PANTOGRAPH.chain(EN_PANTOGRAPH.dampings)),
         np.concatenate([-load, [[1.0], [0.0]]]),
         len(load),
+        NEWMARK,
     )
-    reduced = theory.couple(line, EN_PANTOGRAPH)
+    reduced = theory.couple(line, EN_PANTOGRAPH, NEWMARK)
     check(
         "effective mass [kg]",
         line.mass,
@@ -147,21 +148,21 @@ def test_a_line_as_a_point_sees_it_is_the_line(bench: Bench) -> None:
         within=1e-12,
     )
     # Round-off of Lanczos's method, orthogonalised twice.
-    ratios = [theory.exchange_ratio(both, step, 1e6) for both in (reduced, whole)]
+    ratios = [both.exchange_ratio(dt, 1e6) for both in (reduced, whole)]
     check("ratio of an exchange", ratios[0], ratios[1], within=1e-10)
-    radii = [theory.radius(both, step, 1e6, "explicit") for both in (reduced, whole)]
+    radii = [both.radius(dt, 1e6, "explicit") for both in (reduced, whole)]
     assert radii[1] > 1.1
     check("radius of an explicit step", radii[0], radii[1], within=1e-8)
     # And too few vectors are too few: what is compared is not the same by itself.
-    few = theory.exchange_ratio(theory.couple(line_at(bench, 2), EN_PANTOGRAPH), step, 1e6)
-    assert abs(few - ratios[1]) > 1e-6
+    few = theory.couple(line_at(bench, 2), EN_PANTOGRAPH, NEWMARK)
+    assert abs(few.exchange_ratio(dt, 1e6) - ratios[1]) > 1e-6
 
 
 def test_a_light_wire_limits_the_step_under_a_heavy_head(bench: Bench) -> None:
     """Not dt = 2 sqrt(m_head / k): the wire meets a force with less than a kilogram."""
     line = line_at(bench)
-    heavy = theory.couple(line, head(30.0))
-    limit = theory.largest_step(heavy, NEWMARK, 1e6, "explicit", (1e-5, 0.025))
+    heavy = theory.couple(line, head(30.0), NEWMARK)
+    limit = heavy.largest_step(1e6, "explicit", (1e-5, 0.025))
     print(f"m_wire {line.mass:.3f} kg, limit {1e3 * limit:.3f} ms")
     # Less than the wire of the longest element, 6.5 m / 3: a force moves its neighbourhood alone.
     assert line.mass < 6.5 / 3 * 1.35

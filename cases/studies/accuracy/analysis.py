@@ -6,7 +6,7 @@ Pure functions on figures that are there already; ``cases/studies/accuracy/runs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -76,7 +76,7 @@ class Row:
     axis: str
     level: str
     outcome: str
-    sizes: dict[str, float] = field(default_factory=dict)
+    sizes: Mapping[str, float] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     percent: dict[str, float] = field(default_factory=dict)
     cost: float = math.nan

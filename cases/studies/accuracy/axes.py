@@ -8,8 +8,8 @@ is, and no difference is an error.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from catenary.base.errors import InputError
@@ -36,27 +36,14 @@ class Level:
 
     name: str
     assignments: tuple[str, ...]
-    sizes: tuple[tuple[str, float], ...] = ()
+    sizes: Mapping[str, float] = field(default_factory=dict)
     quick: bool = False
 
-    def size(self, name: str) -> float | None:
-        """The value of one of ``sizes``, None if it has none."""
-        return dict(self.sizes).get(name)
 
-
-@dataclass(frozen=True)
-class Reference:
-    """Reference and measure of the levels of a discretisation axis.
-
-    Attributes
-    ----------
-    level : finer than every level of the axis in all that it refines
-    chains : for each size three levels, of which each has half the fineness of the one before it;
-        the first is the reference, or has its fineness in that size
-    """
-
-    level: Level
-    chains: tuple[tuple[Level, Level, Level], ...]
+# For each size that an axis refines three levels, of which each has half the fineness of the one
+# before it. The very first level is the reference, finer than every level of the axis; the first
+# ones of the others have its fineness in their size.
+Chains = tuple[tuple[Level, Level, Level], ...]
 
 
 @dataclass(frozen=True)
@@ -67,8 +54,8 @@ class Axis:
     ----------
     name, title : for the option ``--axes`` and for headings
     levels : returns the levels for a scene; empty if the scene has nothing to vary
-    reference : returns the reference of a discretisation axis; None for models, which are compared
-        with the unchanged scene
+    chains : returns those to the reference of a discretisation axis, in the long or the short form;
+        None for models, which are compared with the unchanged scene
     refined : the size of the levels to which an observed order belongs, "" if none
     step_alone : returns the level with the same mesh and the reference's step. The difference of
         the two is the error of the step, the remainder that of the mesh; None if the axis does not
@@ -78,14 +65,14 @@ class Axis:
     name: str
     title: str
     levels: Callable[[Scene], Sequence[Level]]
-    reference: Callable[[bool], Reference] | None = None
+    chains: Callable[[bool], Chains] | None = None
     refined: str = ""
     step_alone: Callable[[Level], Level] | None = None
 
     @property
     def kind(self) -> str:
         """Whether its levels solve the same equations, ``DISCRETISATION``, or others, ``MODEL``."""
-        return MODEL if self.reference is None else DISCRETISATION
+        return MODEL if self.chains is None else DISCRETISATION
 
     def chosen(self, scene: Scene, quick: bool) -> list[Level]:
         """The levels of the axis for a scene, in the long or the short form."""
@@ -250,13 +237,11 @@ def parse_axes(text: str | None) -> list[Axis]:
 def step(dt: float, elements: int | None = None, quick: bool = False) -> Level:
     """Level with a time step ``dt`` [s], and with ``elements`` per gap of droppers if given;
     ``quick`` if the short form of the study has it."""
-    assignments, sizes = [f"numerics.dt_s={dt:g}"], [("dt", dt)]
-    name = f"{1e3 * dt:g}_ms"
-    if elements is not None:
-        name += f"_{elements}_elements"
-        assignments.append(f"mesh.elements_per_gap={elements}")
-        sizes.append(("h", 1.0 / elements))
-    return Level(name, tuple(assignments), tuple(sizes), quick)
+    name, word = f"{1e3 * dt:g}_ms", f"numerics.dt_s={dt:g}"
+    if elements is None:
+        return Level(name, (word,), {"dt": dt}, quick)
+    words = word, f"mesh.elements_per_gap={elements}"
+    return Level(f"{name}_{elements}_elements", words, {"dt": dt, "h": 1.0 / elements}, quick)
 
 
 def mesh(elements: int, quick: bool = False, dt: float | None = None) -> Level:
@@ -264,7 +249,7 @@ def mesh(elements: int, quick: bool = False, dt: float | None = None) -> Level:
     own; ``quick`` if the short form of the study has it."""
     assignments = [f"mesh.elements_per_gap={elements}"]
     assignments += [] if dt is None else [f"numerics.dt_s={dt:g}"]
-    return Level(f"{elements}_elements", tuple(assignments), (("h", 1.0 / elements),), quick)
+    return Level(f"{elements}_elements", tuple(assignments), {"h": 1.0 / elements}, quick)
 
 
 _STEPS = ((2e-4, False), (5e-4, False), (1e-3, True), (2e-3, True), (4e-3, False), (8e-3, False))
@@ -280,10 +265,10 @@ def _steps(scene: Scene) -> list[Level]:
     return [step(dt, None, quick) for dt, quick in _STEPS]
 
 
-def _fine_step(quick: bool) -> Reference:
+def _fine_step(quick: bool) -> Chains:
     """On the scene's own mesh: of the error of the step alone."""
     dt = 1.25e-4 if quick else 5e-5
-    return Reference(step(dt), ((step(dt), step(2 * dt), step(4 * dt)),))
+    return ((step(dt), step(2 * dt), step(4 * dt)),)
 
 
 def _meshes(scene: Scene) -> list[Level]:
@@ -292,18 +277,16 @@ def _meshes(scene: Scene) -> list[Level]:
     return [mesh(n, n in _FEW_ELEMENTS, _FINEST_STEP) for n in _ELEMENTS]
 
 
-def _fine_both(quick: bool) -> Reference:
+def _fine_both(quick: bool) -> Chains:
     dt, n = _FINEST_STEP, _QUICK_MESH if quick else _FINEST_MESH
     meshes = step(dt, n), step(dt, n // 2), step(dt, n // 4)
     # Steps on the coarsest of these meshes: fine meshes and long steps do not go together.
     steps = meshes[-1], step(2 * dt, n // 4), step(4 * dt, n // 4)
-    return Reference(meshes[0], (meshes, steps))
+    return meshes, steps
 
 
 def _at_the_finest_step(level: Level) -> Level:
-    h = level.size("h")
-    assert h is not None
-    return step(_FINEST_STEP, round(1.0 / h))
+    return step(_FINEST_STEP, round(1.0 / level.sizes["h"]))
 
 
 # Fine meshes with long steps are left out of the grid, as above [s].

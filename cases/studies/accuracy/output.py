@@ -25,12 +25,7 @@ from catenary.cases.studies.accuracy.runs import Measured, PlannedAxis
 from catenary.postproc.evaluate.wording import capital, counted
 from catenary.postproc.files.disk import plain
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import (
-    Column,
-    Content,
-    StudyTable,
-    remark_lines,
-)
+from catenary.postproc.report.study_table import Column, Content, StudyTable, remark_lines
 
 TABLE, RECORD, PAGE = "accuracy.csv", "accuracy.json", "accuracy.md"
 PICTURE = "work_precision.png"
@@ -59,23 +54,17 @@ def files_of(found: Measured, target: float) -> dict[str, Content]:
 def table_of(rows: Sequence[Row], axis: Axis | None = None) -> StudyTable:
     """Table of rows: those of one ``axis``, for people, or without it those of all axes, for
     files."""
-    shown: dict[str, str] = {}
-    if axis is not None:
-        shown = {f"error_{name}_percent": name for name in QUANTITIES}
-        if any(row.by_step for row in rows):
-            shown |= {
-                f"error_{HISTORY}_by_{part}_percent": f"{HISTORY} by {part}"
-                for part in ("step", "mesh")
-            }
-        shown |= {"estimate_over_true": "est/true", "rounds_per_step": "solves"}
-        shown |= {"march_s_per_s": "s/s", "n_remarks": "remarks"}
-    files = [name for name in _figures_of(Row("", "", "done")) if name not in _FOR_PEOPLE]
-    for_people = [Column("setting", axis.name if axis else "", in_files=False)]
-    for_people += [
-        Column(name, head, "d" if name == "n_remarks" else ".3g", in_files=False)
-        for name, head in shown.items()
-    ]
-    return StudyTable([*map(Column, files), *for_people], [_figures_of(row, axis) for row in rows])
+    figures_of = [_figures_of(row, axis) for row in rows]
+    if axis is None:
+        names = [name for name in _figures_of(Row("", "", "done")) if name not in _FOR_PEOPLE]
+        return StudyTable([*map(Column, names)], figures_of)
+    shown = {f"error_{name}_percent": name for name in QUANTITIES}
+    for part in ("step", "mesh") if any(row.by_step for row in rows) else ():
+        shown[f"error_{HISTORY}_by_{part}_percent"] = f"{HISTORY} by {part}"
+    shown |= {"estimate_over_true": "est/true", "rounds_per_step": "solves", "march_s_per_s": "s/s"}
+    columns = [Column("setting", axis.name)]
+    columns += [Column(name, head, ".3g") for name, head in shown.items()]
+    return StudyTable([*columns, Column("n_remarks", "remarks", "d")], figures_of)
 
 
 _FOR_PEOPLE = ("setting", "estimate_over_true", "n_remarks")
@@ -196,7 +185,7 @@ def uncertainty_text(planned: PlannedAxis, percent: Mapping[str, float]) -> str:
     known = {what: value for what, value in percent.items() if math.isfinite(value)}
     if not known:
         return f"the uncertainty of the reference is not known from {from_runs}"
-    values = ", ".join(f"{what} {f'{value:.3g}'}" for what, value in known.items())
+    values = ", ".join(f"{what} {value:.3g}" for what, value in known.items())
     return f"uncertainty of the reference, from {from_runs} [%]: {values}"
 
 
@@ -241,8 +230,7 @@ def advices(found: Measured, target: float) -> list[str]:
 @figures.own_style()
 def draw(found: Measured) -> Figure:
     """Error of the force history over the time of the march, with the Pareto front."""
-    figure = figures.new_figure(4.8)
-    axes = figure.subplots()
+    figure, axes = figures.panels(4.8)
     fronts = []
     for number, axis in enumerate(_precise(found)):
         rows = [row for row in found.rows_of(axis.name) if row.done and row.percent[HISTORY] > 0]

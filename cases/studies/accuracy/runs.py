@@ -17,7 +17,7 @@ from catenary.cases.scene.input.case_files import find_case
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import Scene, resolved
 from catenary.cases.studies.accuracy.analysis import Found, Row, compare, separate, uncertainties
-from catenary.cases.studies.accuracy.axes import Axis, Level, Reference
+from catenary.cases.studies.accuracy.axes import Axis, Level
 from catenary.cases.studies.sweep.jobs import (
     AS_USUAL,
     Ended,
@@ -51,7 +51,7 @@ class PlannedAxis:
     runs : name of the run of each possible level, by the level's name
     refused : reason why a level is not possible, by the level's name
     reference : name of the run that levels are compared with
-    chains : names of the runs of each chain, see ``Reference``; empty for models
+    chains : names of the runs of each chain, see ``Axis``; empty for models
     step_alone : name of the run with the reference's step, by the level's name, see ``Axis``
     """
 
@@ -167,12 +167,9 @@ def _planned(axis: Axis, scene: Scene, jobs: _Jobs, quick: bool) -> Iterator[Pla
     levels = axis.chosen(scene, quick)
     if not levels:
         return
-    if axis.reference is not None:
-        pair: Reference = axis.reference(quick)
-        reference = jobs.add(axis.name, pair.level)
-        chains = tuple(tuple(jobs.add(axis.name, one) for one in chain) for chain in pair.chains)
-    else:
-        reference, chains = jobs.add(axis.name, AS_IT_IS), ()
+    both = axis.chains(quick) if axis.chains is not None else ()
+    reference = jobs.add(axis.name, both[0][0] if both else AS_IT_IS)
+    chains = tuple(tuple(jobs.add(axis.name, one) for one in chain) for chain in both)
     runs, refused, step_alone = {}, {}, {}
     file = find_case(jobs.case).absolute()  # a study is read by others, elsewhere
     for level in levels:
@@ -237,10 +234,7 @@ def measure(results: Results) -> dict[str, Any]:
 
 
 def run(
-    plan: Plan,
-    out_dir: Path,
-    comm: Any,
-    options: RunOptions = AS_USUAL,
+    plan: Plan, out_dir: Path, comm: Any, options: RunOptions = AS_USUAL
 ) -> tuple[Measured, list[Ended]]:
     """Run what is not done yet; returns the measurements and all runs. Collective.
 
@@ -316,12 +310,12 @@ def _row(
 ) -> Row:
     name, head = level.name, (planned.axis.name, level.name)
     if name in planned.refused:
-        return Row(*head, f"not possible: {planned.refused[name]}", dict(level.sizes))
+        return Row(*head, f"not possible: {planned.refused[name]}", level.sizes)
     one = runs[planned.runs[name]]
     found, reference = _found(one), _found(runs[planned.reference])
     if found is None or reference is None:
         outcome = one.outcome if found is None else "its reference broke"
-        return Row(*head, outcome, dict(level.sizes))
+        return Row(*head, outcome, level.sizes)
     errors, percent = compare(found, reference)
     fine = planned.step_alone.get(name)
     by_step, by_mesh = separate(found, None if fine is None else _found(runs[fine]), reference)
@@ -332,7 +326,7 @@ def _row(
     return Row(
         *head,
         one.outcome,
-        dict(level.sizes),
+        level.sizes,
         errors,
         percent,
         cost=min(costs, default=math.nan) / summary["simulated_s"],

@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import fnmatch
 from functools import cache
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from typing import Literal
 
@@ -55,9 +55,7 @@ class Needs(Table):
         False, description="one of them stands within an element of the boundary of two ranks"
     )
     energy_leaves: float | None = Field(
-        None,
-        gt=0,
-        description="most by which the energy that leaves differs from theory, relative",
+        None, gt=0, description="most by which the energy that leaves differs from theory, relative"
     )
     no_force_after_s: float | None = Field(
         None, ge=0, description="no pantograph touches the wire after this time"
@@ -75,7 +73,9 @@ class HardCase(Table):
     what: str = Field(min_length=1, description="what is hard about it")
     right: str = Field(min_length=1, description="what a right answer is")
     kind: Literal["train", "free"] = Field("train", description="what moves")
-    set: list[str] = Field(default_factory=list, description="assignments, as after --set")
+    set: list[str] = Field(
+        default_factory=list, description="assignments, as after --set, or names of sets and lines"
+    )
     short: list[str] = Field(default_factory=list, description="further ones of the short form")
     force_below_N: float = Field(1e3, gt=0, description="no contact force is greater")
     uplift_below_m: float = Field(0.3, gt=0, description="no contact lifts the wire by more")
@@ -117,7 +117,7 @@ class HardCase(Table):
         """Its scene, in the ``short`` form, with the step halved ``halvings`` times, or with the
         paper's ``fixed_point`` correction."""
         table = collection()
-        words = [*table.common, *self.set, *(self.short if short else [])]
+        words = [*table.common, *table.assignments(self.set), *(self.short if short else [])]
         words += _CORRECTION if fixed_point else ()
         scene = load_scene(table.base, words)
         if halvings:
@@ -142,11 +142,20 @@ class Collection(Table):
 
     base: str = Field(description="the shipped case that all are variants of")
     common: list[str] = Field(description="assignments of all")
+    sets: dict[str, list[str]] = Field(
+        default_factory=dict, description="assignments that several cases have, by their name"
+    )
     cases: list[HardCase] = Field(min_length=1, description="the cases")
     lines: list[HardLine] = Field(default_factory=list, description="lines of other kinds")
     conditions: list[HardCase] = Field(
         default_factory=list, description="what each of these lines is put under"
     )
+
+    def assignments(self, words: list[str]) -> list[str]:
+        """Assignments of words that are such, or names of sets or lines."""
+        named = {line.name: line.set for line in self.lines} | self.sets
+        parts = (self.assignments(named[word]) if word in named else [word] for word in words)
+        return [*chain(*parts)]
 
     def all_cases(self) -> list[HardCase]:
         """The cases, and each line under each condition unless a case has that name."""

@@ -275,16 +275,16 @@ class _OneCase:
         def compare() -> Criterion:
             one = run(self.alone)
             if case.kind == "free":
-                apart = float(np.abs(together.energy / one.energy - 1.0).max())
-                return self._below(name, apart, case.ranks)
-            if one.force.shape != together.force.shape:
+                apart = np.abs(together.energy / one.energy - 1.0).max()
+            elif one.force.shape != together.force.shape:
                 return self._holds(name, False, together.outcome)
-            if case.ranks_m is not None:
-                apart = float(np.abs(together.height - one.height).max())
+            elif case.ranks_m is not None:
+                apart = np.abs(together.height - one.height).max()
                 heights = f"1 and {world.size} ranks, head height [m]"
-                return self._below(heights, apart, case.ranks_m)
-            apart = float(np.abs(together.force - one.force).max() / np.abs(one.force).max())
-            return self._below(name, apart, case.ranks)
+                return self._below(heights, float(apart), case.ranks_m)
+            else:
+                apart = np.abs(together.force - one.force).max() / np.abs(one.force).max()
+            return self._below(name, float(apart), case.ranks)
 
         result: Criterion = on_root(world, compare, takes_long=True)
         return result
@@ -374,11 +374,11 @@ def criteria(found: Sequence[Criterion], remarks_of: Remarks) -> StudyTable:
     """Table of criteria, a row each; ``remarks_of`` gives each case that has any a row with its
     remarks."""
     names = ("case", "criterion", "value", "limit", "kept", "note")
+    kept = {True: "yes", False: "no"}
     rows: list[tuple[str, ...]] = [
-        (row.case, row.name, f"{row.value:.3g}", f"{row.limit:.3g}", "yes" if row.passed else "no",
-         row.note)
-        for row in found
-    ]  # fmt: skip
+        (one.case, one.name, f"{one.value:.3g}", f"{one.limit:.3g}", kept[one.passed], one.note)
+        for one in found
+    ]
     for case, remarks in remarks_of.items():
         texts = [f"{run}: {text}" for run, own in remarks.items() for text in own]
         if texts:

@@ -377,10 +377,7 @@ class LineBalance:
         self._ends = model.dofs(model.mesh.droppers)
         released = (1.0 - model.simulated.kept_ratio) * model.released_damping
         of_velocity = 0.5 * dt * (gamma - 0.5) * released
-        self._slack = [
-            ("velocity", of_velocity),
-            ("acceleration", dt**2 * excess * of_velocity),
-        ]
+        self._slack = [("velocity", of_velocity), ("acceleration", dt**2 * excess * of_velocity)]
         # Gusts do work as contacts do. What a line beyond an end does is a part of the line.
         whole = Subdomain(*(0, model.n_dofs) * 3)
         outer = [load for load in model.loads if not isinstance(load, MemoryLoad)]

@@ -8,6 +8,7 @@ the first, even division shows, and bisects each of their ends.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -107,10 +108,7 @@ class SpeedStudy(NamedTuple):
 
 
 def find_speeds(
-    marching: Marching,
-    speeds: Speeds,
-    wanted: Sequence[str],
-    direction: str | None = None,
+    marching: Marching, speeds: Speeds, wanted: Sequence[str], direction: str | None = None
 ) -> SpeedStudy:
     """March the speeds, and find where the criteria hold. Collective.
 
@@ -253,23 +251,17 @@ def _holds(ended: _Marched, name: str, names: Sequence[str], directions: Sequenc
         for way in directions
         if fails_at is not None and not _is_held(ended, fails_at, [way], own)
     }
-    rows = [row for one in failed.values() if (row := _row(one, name)) is not None]
-    by = [(row["value"], row["limit"]) for row in rows if row["value"] is not None]
+    rows = [_row(one, name) for one in failed.values()]
+    by = [(row["value"], row["limit"]) for row in rows if row and row["value"] is not None]
     stopped: list[str] = []
     for one in failed.values() if name == ALL else ():
         missed = [n for n in names if (row := _row(one, n)) is None or row["passed"] is not True]
         stopped += missed if one.done else [one.outcome]
-    known = (_row(one, name) for one in ended.values())
-    unit = next((str(row["unit"]) for row in known if row is not None), "")
-    return Holds(
-        name,
-        stretches,
-        highest,
-        max(by, key=lambda pair: abs(pair[0] - pair[1]), default=None),
-        unit,
-        next(iter(failed), "") if len(failed) < 2 else BOTH,
-        tuple(dict.fromkeys(stopped)),
-    )
+    units = (str(row["unit"]) for one in ended.values() if (row := _row(one, name)))
+    fails_by = max(by, key=lambda pair: abs(pair[0] - pair[1]), default=None)
+    direction = next(iter(failed), "") if len(failed) < 2 else BOTH
+    stopped_by = tuple(dict.fromkeys(stopped))
+    return Holds(name, stretches, highest, fails_by, next(units, ""), direction, stopped_by)
 
 
 def table_of_criteria(study: SpeedStudy) -> StudyTable:
@@ -294,15 +286,15 @@ def table_of_criteria(study: SpeedStudy) -> StudyTable:
 
 
 def _cells(one: Holds, slowest: float) -> Row:
-    first = one.stretches[0] if one.stretches else None
+    holds_from, highest, fails_at = one.stretches[0] if one.stretches else (None, None, slowest)
     value, limit = one.fails_by or (None, None)
     digits = decimals_that_tell(value, limit, 2)
     shown = [None if own is None else fixed(own, digits) for own in (value, limit)]
     return {
         "criterion": one.criterion,
-        "holds_from_km_h": None if first is None else first.slowest,
-        "highest_km_h": None if first is None else first.fastest,
-        "fails_at_km_h": slowest if first is None else first.fails_at,
+        "holds_from_km_h": holds_from,
+        "highest_km_h": highest,
+        "fails_at_km_h": fails_at,
         "value": value,
         "limit": limit,
         "shown_value": shown[0],
@@ -318,9 +310,8 @@ def _cells(one: Holds, slowest: float) -> Row:
 def as_text(study: SpeedStudy) -> str:
     """The answer in a sentence, and the table of criteria."""
     speeds, whole, *judged = study.speeds, *study.holds
-    hold = f"all {len(judged)} criteria judged here hold"
-    if len(judged) == 1:
-        hold = "the one criterion judged here holds"
+    all_of_them = f"all {len(judged)} criteria judged here hold"
+    hold = "the one criterion judged here holds" if len(judged) == 1 else all_of_them
     where = f"from {speeds.slowest:g} to {speeds.fastest:g} km/h"
     if not judged:
         answer = f"No criterion is judged {where}."
@@ -378,8 +369,7 @@ def draw(study: SpeedStudy) -> Figure | None:
     rows = [row for row in table_of(study.ended).rows if row["outcome"] == "done"]
     if len({row[KEY] for row in rows}) < 2:
         return None
-    figure = figures.new_figure(0.6 + 2.0 * len(_PANELS))
-    panels = figure.subplots(len(_PANELS), 1, sharex=True)
+    figure, panels = figures.panels(0.6 + 2.0 * len(_PANELS), len(_PANELS), 1, sharex=True)
     names = list(dict.fromkeys(row["pantograph"] for row in rows))
     looks = dict(zip(study.directions, ("-", ":"), strict=False))
     for (statistic, criterion), axes in zip(_PANELS, panels, strict=True):
@@ -427,10 +417,8 @@ def _limits(
             if row["criterion"].startswith(criterion) and row["limit"] is not None:
                 place = (float(one.variant.varied[KEY]), float(row["limit"]))
                 limits.setdefault((way, row["criterion"]), []).append(place)
-    found = []
-    for (_, name), places in limits.items():
-        rest = name.removeprefix(criterion)
-        for pantograph in pantographs:
-            rest = rest.removesuffix(f", {pantograph}")
-        found.append((rest, places))
-    return found
+    whose = "|".join(map(re.escape, pantographs))
+    return [
+        (re.sub(f", ({whose})$", "", name.removeprefix(criterion)), places)
+        for (_, name), places in limits.items()
+    ]

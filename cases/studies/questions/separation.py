@@ -32,13 +32,7 @@ from catenary.cases.studies.sweep.together import Marching
 from catenary.cases.studies.sweep.variants import Variant, text_of
 from catenary.postproc.evaluate.wording import counted
 from catenary.postproc.report.pictures import figures
-from catenary.postproc.report.study_table import (
-    Column,
-    Content,
-    Row,
-    StudyTable,
-    remark_lines,
-)
+from catenary.postproc.report.study_table import Column, Content, Row, StudyTable, remark_lines
 
 if TYPE_CHECKING:
     from catenary.cases.studies.waves.theory import WaveTheory
@@ -306,19 +300,19 @@ def _uplift(row: Row) -> str:
 
 def _explained(period: Period) -> str:
     """Sentence on the period of the deviation, and on the periods that theory offers."""
-    low, high = period.ringing
-    found = f"No period is found in fewer than {_LEAST_FOR_PERIOD} distances"
-    if np.isfinite(period.tried).all():
-        found = (
-            "No period from {:.0f} to {:.0f} m, which these distances can show, explains more of "
-            "the trailing one's deviation than chance"
-        ).format(*period.tried)
+    (low, high), (shortest, longest) = period.ringing, period.tried
     if np.isfinite(period.fitted):
-        share = 100 * period.explains
         found = (
-            f"A period of {period.fitted:.0f} m explains {share:.0f} % of the variance of the "
-            "trailing one's deviation about its trend"
+            f"A period of {period.fitted:.0f} m explains {100 * period.explains:.0f} % of the "
+            "variance of the trailing one's deviation about its trend"
         )
+    elif np.isfinite(period.tried).all():
+        found = (
+            f"No period from {shortest:.0f} to {longest:.0f} m, which these distances can show, "
+            "explains more of the trailing one's deviation than chance"
+        )
+    else:
+        found = f"No period is found in fewer than {_LEAST_FOR_PERIOD} distances"
     rings = f"spans ring once in {low:.0f} to {high:.0f} m, " if np.isfinite(low) else ""
     return f"{found}; {rings}waves from the leading one repeat every {period.travel:.0f} m."
 
@@ -368,17 +362,15 @@ def draw(study: SeparationStudy, period: Period) -> Figure | None:
         ("largest uplift at arms [mm]", [_UPLIFT]),
     )
     for axes, (label, names) in zip(panels, shown, strict=True):
-        for number, name in enumerate(names):
+        curves = enumerate(PLACES) if len(names) > 1 else [(2, "both")]
+        for (number, of), name, line in zip(curves, names, figures.LINES, strict=False):
             y = np.array([row[name] for row in done], dtype=float)
-            of = PLACES[number] if len(names) > 1 else "both"
-            look = f".{figures.line(number)}"
-            figures.curve(axes, x, y, number if len(names) > 1 else 2, of, look)
+            figures.curve(axes, x, y, number, of, f".{line}")
         if (alone := study.rows[0][names[0]]) is not None:
             axes.axhline(alone, color=figures.GREY, linestyle=":", label="one alone")
         if np.isfinite(period.ringing).all():
             for n in range(1, int(x[-1] / period.ringing[0]) + 1):
                 low, high = np.clip(n * period.ringing, x[0], x[-1])
                 axes.axvspan(low, high, color=figures.SHADE, zorder=0)
-        figures.tidy(axes, "distance [m]; shaded: whole periods of the ringing", label)
-        figures.legend_above(axes)
+        figures.tidy(axes, "distance [m]; shaded: whole periods of the ringing", label, legend=True)
     return figure

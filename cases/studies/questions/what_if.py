@@ -170,8 +170,8 @@ def _by_place(
     rows = []
     for i, j in _pairs(first.x, second.x):
         inside = bool(first.evaluated[i])
-        row: dict[str, Any] = {"x_m": float(first.x[i]), "evaluated": inside}
-        row["stretch"] = "evaluated" if inside else ""
+        stretch = "evaluated" if inside else ""
+        row: dict[str, Any] = {"x_m": float(first.x[i]), "evaluated": inside, "stretch": stretch}
         for column, (own, other) in of_each:
             row |= _figures(column.name, own[i], other[j])
         rows.append(row)
@@ -219,12 +219,8 @@ def _criteria(before: dict[str, Any], after: dict[str, Any]) -> StudyTable:
 
 def as_text(found: Differences) -> str:
     """Statistics, verdicts that change, and what changes most of the line."""
-    lines = [
-        f"{found.case} with {', '.join(found.changes)}",
-        "",
-        found.tables["statistics"].text(),
-        "",
-    ]
+    lines = [f"{found.case} with {', '.join(found.changes)}", ""]
+    lines += [found.tables["statistics"].text(), ""]
     rows = found.tables["verdicts"].rows
     verdicts = [(row["criterion"], row["verdict_as_it_is"], row["verdict_changed"]) for row in rows]
     lines += [
@@ -282,16 +278,15 @@ def _sections(found: Differences) -> Iterator[Section]:
 def draw_forces(a: Results, b: Results) -> Figure | None:
     """Contact forces of both runs along the track, a panel for each pantograph that both have."""
     names = a.pantograph_names()[: min(a.n_pantographs, b.n_pantographs)]
-    panels = [
-        (
-            name,
-            [
-                (words, run.column("contact_position", p), _force(run, p))
-                for run, words in zip((a, b), WORDS.values(), strict=True)
-            ],
-        )
-        for p, name in enumerate(names)
-    ]
+    runs = dict(zip(WORDS.values(), (a, b), strict=True))
+
+    def curves(p: int) -> list[along_track.Curve]:
+        return [
+            (words, run.column("contact_position", p), _force(run, p))
+            for words, run in runs.items()
+        ]
+
+    panels = [(name, curves(p)) for p, name in enumerate(names)]
     return along_track.overlaid_forces(panels, a.evaluation, f"{filters.CUT_OFF:g} Hz")
 
 

@@ -124,6 +124,11 @@ def _add_statistics(
             raise InputError(
                 f'{name} has no column "{column}": a table of statistics has {", ".join(needed)}'
             )
+        empty = np.flatnonzero(table[column].isna() & (column != _VALUE))
+        if empty.size:
+            raise InputError(
+                f'{name} has nothing in column "{column}", row {empty[0] + 1} below its names'
+            )
     if table.empty:
         raise InputError(f"{name} has no rows: it gives no statistics to judge")
     values = column_of(table, name, _VALUE)

@@ -26,7 +26,8 @@ slack droppers all is linear, so that the size of the start does not matter.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg, optimize
@@ -84,8 +85,7 @@ class PointModel:
         return 1.0 / _largest(self.load.T @ self.load)
 
 
-@dataclass(frozen=True)
-class Methods:
+class Methods(NamedTuple):
     """How the ``line`` and the ``pantograph`` step."""
 
     line: Integration
@@ -100,16 +100,8 @@ def methods_of(numerics: Numerics) -> Methods:
 
 
 @dataclass(frozen=True)
-class Step:
-    """A step of ``dt`` [s]."""
-
-    dt: float
-    methods: Methods
-
-
-@dataclass(frozen=True)
 class Coupled:
-    """Line and pantograph on two sides of c contacts.
+    """Line and pantograph on two sides of c contacts, and the ``methods`` by which they step.
 
     ``mass``, ``stiffness``, ``damping`` (n, n) of both, the first ``n_line`` unknowns being the
     line's; ``depth`` (n, c) the contacts' depths for unit displacements.
@@ -120,26 +112,85 @@ class Coupled:
     damping: np.ndarray
     depth: np.ndarray
     n_line: int
+    methods: Methods
 
-    def weights(self, methods: Methods) -> _Weights:
-        """What the ``methods`` make of each unknown."""
+    @cached_property
+    def _by_unknown(self) -> np.ndarray:
+        """Newmark's beta and gamma of each unknown, and q, of_a and of_b, (5, n, 1).
+
+        a = q b + p, where p is made with of_a and of_b from the step before.
+        """
         n = [self.n_line, len(self.depth) - self.n_line]
-        both = zip(methods.line, methods.pantograph, strict=True)
+        both = zip(*self.methods, strict=True)
         beta, gamma, a_m, a_f = (np.repeat(pair, n)[:, None] for pair in both)
-        share = (1.0 - a_f) / (1.0 - a_m)
-        return _Weights(beta, gamma, share, -a_m / (1.0 - a_m), a_f / (1.0 - a_m))
+        parts = (1.0 - a_f, -a_m, a_f)
+        return np.stack([beta, gamma, *(part / (1.0 - a_m) for part in parts)])
 
+    def step_matrix(self, dt: float, implicit: float, explicit: float) -> np.ndarray:
+        """Matrix of a step of ``dt`` [s] for (d, dt v, dt^2 a), and under HHT and generalized alpha
+        dt^2 b; shape (3 n, 3 n) or (4 n, 4 n).
 
-@dataclass(frozen=True)
-class _Weights:
-    """Newmark's ``beta`` and ``gamma`` of each unknown, (n, 1) as all, and a = q b + p, where q is
-    the ``share`` of b and p is made with ``of_a`` and ``of_b`` from the step before."""
+        ``implicit`` and ``explicit`` are the parts of the contact's stiffness [N/m] that act at the
+        end of the step and at the prediction.
+        """
+        beta, gamma, share, of_a, of_b = self._by_unknown
+        n = len(self.depth)
+        one, none, spring = np.eye(n), np.zeros((n, n)), self.depth @ self.depth.T
+        stiffness = self.stiffness + implicit * spring
+        before = np.hstack([none, none, of_a * one, of_b * one])
+        place = np.hstack([one, one, (0.5 - beta) * one, none]) + beta * before
+        speed = np.hstack([none, one, (1.0 - gamma) * one, none]) + gamma * before
+        force = dt**2 * (stiffness + explicit * spring) @ place + dt * self.damping @ speed
+        found = -linalg.solve(self._operator(dt, stiffness), force)
+        moved = share * found
+        rows = [place + beta * moved, speed + gamma * moved, before + moved, found]
+        weighted = any(self.methods.line[2:])
+        return np.vstack(rows) if weighted else np.vstack(rows[:3])[:, : 3 * n]
 
-    beta: np.ndarray
-    gamma: np.ndarray
-    share: np.ndarray
-    of_a: np.ndarray
-    of_b: np.ndarray
+    def _operator(self, dt: float, stiffness: np.ndarray) -> np.ndarray:
+        """A, (n, n), with the ``stiffness`` of both; each column by the method of its unknown."""
+        beta, gamma, share, *_ = self._by_unknown
+        by_speed, by_place = share * gamma * dt, share * beta * dt**2
+        return np.asarray(self.mass + by_speed.T * self.damping + by_place.T * stiffness)
+
+    def radius(self, dt: float, stiffness: float, coupling: str) -> float:
+        """Spectral radius of a step of ``dt`` [s] with the "implicit" or "explicit" ``coupling`` by
+        a contact of ``stiffness`` [N/m]."""
+        parts = (stiffness, 0.0) if coupling == "implicit" else (0.0, stiffness)
+        return float(np.abs(linalg.eigvals(self.step_matrix(dt, *parts))).max())
+
+    def exchange_ratio(self, dt: float, stiffness: float) -> float:
+        """Largest factor by which an exchange of forces and motions in a step of ``dt`` [s]
+        multiplies errors of the forces, on a contact of ``stiffness`` [N/m]."""
+        beta, _, share, *_ = self._by_unknown
+        answer = linalg.solve(self._operator(dt, self.stiffness), self.depth)
+        return stiffness * _largest(self.depth.T @ (share * beta * dt**2 * answer))
+
+    def largest_step(
+        self, stiffness: float, coupling: str, steps: tuple[float, float], allowed: float = 1.0
+    ) -> float:
+        """Largest step [s] of a coupling out of a range, inf if all are stable and 0 if none is.
+
+        Parameters
+        ----------
+        stiffness : of the contact [N/m]
+        coupling : "implicit", "explicit", or any other, which exchanges
+        steps : least and greatest [s]
+        allowed : largest factor by which a step or an exchange may multiply errors
+        """
+
+        def excess(log_dt: float) -> float:
+            dt = float(np.exp(log_dt))
+            if coupling in ("implicit", "explicit"):
+                return self.radius(dt, stiffness, coupling) - max(allowed, STABLE)
+            return self.exchange_ratio(dt, stiffness) - allowed
+
+        low, high = np.log(steps)
+        if excess(low) > 0:
+            return 0.0
+        if excess(high) <= 0:
+            return np.inf
+        return float(np.exp(optimize.bisect(excess, low, high, xtol=1e-5)))
 
 
 def matrices(model: Model) -> tuple[csc_matrix, csc_matrix, csc_matrix]:
@@ -228,10 +279,9 @@ def point_model(model: Model, loads: np.ndarray, n_vectors: int = N_VECTORS) -> 
     return PointModel(basis.T @ (stiffness @ basis), basis.T @ (damping @ basis), basis.T @ loads)
 
 
-def couple(line: PointModel, data: LumpedData) -> Coupled:
-    """Line and chain of masses, without the springs of the contacts."""
-    n_wires = line.load.shape[1]
-    head = np.zeros((data.n_masses, n_wires))
+def couple(line: PointModel, data: LumpedData, methods: Methods) -> Coupled:
+    """Line and chain of masses, without the springs of the contacts; both step by ``methods``."""
+    head = np.zeros((data.n_masses, line.load.shape[1]))
     head[0] = 1.0
     return Coupled(
         linalg.block_diag(np.eye(len(line.load)), np.diag(data.masses)),
@@ -239,87 +289,8 @@ def couple(line: PointModel, data: LumpedData) -> Coupled:
         linalg.block_diag(line.damping, data.chain(data.dampings)),
         np.concatenate([-line.load, head]),
         len(line.load),
+        methods,
     )
-
-
-def step_matrix(both: Coupled, step: Step, implicit: float, explicit: float) -> np.ndarray:
-    """Matrix of a step for (d, dt v, dt^2 a), and under HHT and generalized alpha dt^2 b; shape
-    (3 n, 3 n) or (4 n, 4 n).
-
-    ``implicit`` and ``explicit`` are the parts of the contact's stiffness [N/m] that act at the
-    end of the step and at the prediction.
-    """
-    n, dt, method = len(both.depth), step.dt, both.weights(step.methods)
-    one, none = np.eye(n), np.zeros((n, n))
-    spring = both.depth @ both.depth.T
-    stiffness = both.stiffness + implicit * spring
-    weighted = any(step.methods.line[2:])
-    before = np.hstack([none, none, method.of_a * one, method.of_b * one])
-    place = np.hstack([one, one, (0.5 - method.beta) * one, none]) + method.beta * before
-    speed = np.hstack([none, one, (1.0 - method.gamma) * one, none]) + method.gamma * before
-    operator = _operator(both, step, stiffness)
-    force = dt**2 * (stiffness + explicit * spring) @ place + dt * both.damping @ speed
-    found = -linalg.solve(operator, force)
-    moved = method.share * found
-    rows = [place + method.beta * moved, speed + method.gamma * moved, before + moved, found]
-    return np.vstack(rows) if weighted else np.vstack(rows[:3])[:, : 3 * n]
-
-
-def _operator(both: Coupled, step: Step, stiffness: np.ndarray) -> np.ndarray:
-    """A, (n, n), with the ``stiffness`` of both; each column by the method of its unknown."""
-    dt, method = step.dt, both.weights(step.methods)
-    by_speed, by_place = method.share * method.gamma * dt, method.share * method.beta * dt**2
-    return np.asarray(both.mass + by_speed.T * both.damping + by_place.T * stiffness)
-
-
-def radius(both: Coupled, step: Step, stiffness: float, coupling: str) -> float:
-    """Spectral radius of a step with the "implicit" or "explicit" ``coupling`` of ``both``, line
-    and head, by a contact of ``stiffness`` [N/m]."""
-    parts = (stiffness, 0.0) if coupling == "implicit" else (0.0, stiffness)
-    return float(np.abs(linalg.eigvals(step_matrix(both, step, *parts))).max())
-
-
-def exchange_ratio(both: Coupled, step: Step, stiffness: float) -> float:
-    """Largest factor by which an exchange of forces and motions multiplies errors of the forces,
-    between line and head, ``both``, on a contact of ``stiffness`` [N/m]."""
-    method = both.weights(step.methods)
-    answer = linalg.solve(_operator(both, step, both.stiffness), both.depth)
-    moved = method.share * method.beta * step.dt**2 * answer
-    return stiffness * _largest(both.depth.T @ moved)
-
-
-def largest_step(
-    both: Coupled,
-    methods: Methods,
-    stiffness: float,
-    coupling: str,
-    steps: tuple[float, float],
-    allowed: float = 1.0,
-) -> float:
-    """Largest step [s] of a coupling out of a range, inf if all are stable and 0 if none is.
-
-    Parameters
-    ----------
-    both : line and head
-    methods : by which both step
-    stiffness : of the contact [N/m]
-    coupling : "implicit", "explicit", or any other, which exchanges
-    steps : least and greatest [s]
-    allowed : largest factor by which a step or an exchange may multiply errors
-    """
-
-    def excess(log_dt: float) -> float:
-        step = Step(float(np.exp(log_dt)), methods)
-        if coupling in ("implicit", "explicit"):
-            return radius(both, step, stiffness, coupling) - max(allowed, STABLE)
-        return exchange_ratio(both, step, stiffness) - allowed
-
-    low, high = np.log(steps)
-    if excess(low) > 0:
-        return 0.0
-    if excess(high) <= 0:
-        return np.inf
-    return float(np.exp(optimize.bisect(excess, low, high, xtol=1e-5)))
 
 
 def closed_form(line: PointModel, head_mass: float, stiffness: float) -> float:
@@ -349,17 +320,21 @@ class Bench:
     x: float
     comm: Any
 
+    def with_head(self, mass: float) -> LumpedData:
+        """The pantograph with a head of ``mass`` [kg]."""
+        data = self.data
+        return LumpedData((mass, *data.masses[1:]), data.stiffnesses, data.dampings)
+
     def problem(self, coupling: str, stiffness: float, head_mass: float, dt: float) -> Problem:
         """A head of ``head_mass`` [kg] on a contact of ``stiffness`` [N/m], for as many steps of
         ``dt`` [s] as show whether the ``coupling`` is stable."""
         usual = self.rest.problem
         height = float(rest_height(self.rest, np.array([self.x]))[0])
-        data = LumpedData(
-            (head_mass, *self.data.masses[1:]), self.data.stiffnesses, self.data.dampings
-        )
-        first = usual.train.placements[0]
         # At its nominal height no spring is strained: nothing but the perturbation moves.
-        placement = replace(first, data=data, static_force=0.0, behind=0.0, nominal_height=height)
+        placement = replace(
+            usual.train.placements[0], data=self.with_head(head_mass), static_force=0.0, behind=0.0,
+            nominal_height=height,
+        )  # fmt: skip
         n_steps = STEPS if coupling in ("implicit", "explicit") else EXCHANGED_STEPS
         train = replace(
             usual.train,
@@ -397,13 +372,9 @@ class Bench:
         return ended.outcome == "done" and not watched.grown
 
     def bracket(
-        self,
-        coupling: str,
-        stiffness: float,
-        head_mass: float,
-        steps: tuple[float, float],
+        self, coupling: str, stiffness: float, head_mass: float, steps: tuple[float, float],
         resolution: float,
-    ) -> tuple[float, float]:
+    ) -> tuple[float, float]:  # fmt: skip
         """A step [s] found stable and one found unstable, by bisection between two ``steps``.
 
         ``coupling``, ``stiffness`` and ``head_mass`` are as of ``is_stable``. The two differ by the
@@ -417,10 +388,8 @@ class Bench:
             return 0.0, low
         while high > (1.0 + resolution) * low:
             middle = float(np.sqrt(low * high))
-            if self.is_stable(coupling, stiffness, head_mass, middle):
-                low = middle
-            else:
-                high = middle
+            is_stable = self.is_stable(coupling, stiffness, head_mass, middle)
+            low, high = (middle, high) if is_stable else (low, middle)
         return low, high
 
 

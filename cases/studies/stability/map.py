@@ -23,16 +23,9 @@ from catenary.cases.scene.scene import Scene, resolved
 from catenary.cases.studies.hard.runs import at_rest
 from catenary.cases.studies.records import NOTHING_KEPT, KeptRows
 from catenary.cases.studies.stability import coupling_schemes as theory
-from catenary.cases.studies.stability.coupling_schemes import (
-    AGREED,
-    COUPLINGS,
-    EXCHANGES,
-    GROWN,
-    STEPS,
-    Bench,
-)
 from catenary.cases.terminal.terminal_text import RunsBar
 from catenary.mbs.lumped import LumpedData
+from catenary.postproc.files.disk import plain
 from catenary.postproc.report.pictures import figures
 from catenary.solver.contact.contact_wire import ContactWires
 from catenary.solver.model.partition import distribute
@@ -42,34 +35,17 @@ from catenary.solver.statics.line_at_rest import LineAtRest
 
 # A linear problem: one contact that neither parts nor damps, taut droppers, steps as tried.
 _LINEAR = (
-    "numerics.iterations=",
-    "numerics.adaptive_tolerance_N=",
-    "numerics.smallest_dt_s=",
-    "numerics.eps_d_m=",
-    "numerics.eps_v_m_per_s=",
-    "numerics.eps_force_N=",
-    "numerics.max_iterations=",
-    "window.mode=off",
-    "window.tolerance=",
-    "window.spans_ahead=",
-    "window.spans_behind=",
-    "numerics.coupling=",
-    "numerics.scheme=one_solve",
-    "contact.restitution=",
-    "contact.hertz_stiffness_N_per_m1_5=",
-    "contact.damping_N_s_per_m=",
-    "contact.least_impact_speed_m_per_s=",
-    "contact.law=linear",
-    "effects.contact_damping=false",
-    "effects.contact_loss=false",
-    "effects.residual_dropper_stiffness=false",
-    "effects.dropper_slackening=false",
-    "effects.uplift_stops=false",
-    "effects.pantograph_laws=false",
-    "effects.regulated_lift=false",
-    "effects.gusts=false",
+    "numerics.iterations=", "numerics.adaptive_tolerance_N=", "numerics.smallest_dt_s=",
+    "numerics.eps_d_m=", "numerics.eps_v_m_per_s=", "numerics.eps_force_N=",
+    "numerics.max_iterations=", "numerics.coupling=", "numerics.scheme=one_solve",
+    "window.mode=off", "window.tolerance=", "window.spans_ahead=", "window.spans_behind=",
+    "contact.restitution=", "contact.hertz_stiffness_N_per_m1_5=", "contact.damping_N_s_per_m=",
+    "contact.least_impact_speed_m_per_s=", "contact.law=linear", "effects.contact_damping=false",
+    "effects.contact_loss=false", "effects.residual_dropper_stiffness=false",
+    "effects.dropper_slackening=false", "effects.uplift_stops=false",
+    "effects.pantograph_laws=false", "effects.regulated_lift=false", "effects.gusts=false",
     "incidents=",
-)
+)  # fmt: skip
 # Steps of the map [s], and how closely a limit is found by marching.
 STEPS_RANGE = (1e-5, MAX_DT)
 RESOLUTION = 0.02
@@ -236,12 +212,12 @@ class _FindLimits:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._bench: tuple[Bench, theory.PointModel] | None = None
+        self._bench: tuple[theory.Bench, theory.PointModel] | None = None
 
     def __reduce__(self) -> tuple[type[_FindLimits], tuple[Scene]]:
         return type(self), (self._scene,)
 
-    def bench(self, comm: Any) -> tuple[Bench, theory.PointModel]:
+    def bench(self, comm: Any) -> tuple[theory.Bench, theory.PointModel]:
         """Bench at the place where heads are tried, and the line reduced to that place."""
         if self._bench is None:
             rest = at_rest(self._scene, comm)
@@ -251,13 +227,13 @@ class _FindLimits:
             place = _place(rest, wires)
             loads = theory.loads_at(wires, place, rest.model.n_dofs)
             line = theory.point_model(rest.model, loads)
-            self._bench = Bench(rest, data, place, comm), line
+            self._bench = theory.Bench(rest, data, place, comm), line
         return self._bench
 
     def __call__(self, pair: tuple[float, float], comm: Any) -> list[Any]:
         """Rows of ``Limit`` for a stiffness [N/m] and a head mass [kg]."""
         bench, line = self.bench(comm)
-        return [astuple(find(bench, line, coupling, *pair)) for coupling in COUPLINGS]
+        return [astuple(find(bench, line, coupling, *pair)) for coupling in theory.COUPLINGS]
 
 
 def _place(rest: LineAtRest, wires: ContactWires) -> float:
@@ -272,7 +248,7 @@ def _place(rest: LineAtRest, wires: ContactWires) -> float:
 
 
 def find(
-    bench: Bench, line: theory.PointModel, coupling: str, stiffness: float, head_mass: float
+    bench: theory.Bench, line: theory.PointModel, coupling: str, stiffness: float, head_mass: float
 ) -> Limit:
     """The limit of a ``coupling`` for a head of ``head_mass`` [kg] on a contact of ``stiffness``
     [N/m]. Not collective.
@@ -281,14 +257,12 @@ def find(
     """
     numerics = bench.rest.problem.numerics
     methods = theory.methods_of(numerics)
-    masses = (head_mass, *bench.data.masses[1:])
-    both = theory.couple(line, LumpedData(masses, bench.data.stiffnesses, bench.data.dampings))
-    seen = GROWN ** (1.0 / STEPS)
+    both = theory.couple(line, bench.with_head(head_mass), methods)
+    seen = theory.GROWN ** (1.0 / theory.STEPS)
     if coupling not in ("implicit", "explicit"):
-        seen = (AGREED / _START) ** (1.0 / EXCHANGES)
+        seen = (theory.AGREED / _START) ** (1.0 / theory.EXCHANGES)
     expected, visible = (
-        theory.largest_step(both, methods, stiffness, coupling, _THEORY_RANGE, allowed)
-        for allowed in (1.0, seen)
+        both.largest_step(stiffness, coupling, _THEORY_RANGE, allowed) for allowed in (1.0, seen)
     )
     if coupling == "implicit":
         # A limit could be anywhere, and stability above it.
@@ -311,10 +285,10 @@ def as_rows(found: StabilityMap) -> list[dict[str, Any]]:
             "stiffness_N_per_m": one.stiffness,
             "head_mass_kg": one.head_mass,
             "wire_mass_kg": found.wire_mass,
-            "theory_s": one.theory if np.isfinite(one.theory) else None,
-            "omega_dt_2_s": one.closed_form if np.isfinite(one.closed_form) else None,
+            "theory_s": plain(one.theory),
+            "omega_dt_2_s": plain(one.closed_form),
             "marched_stable_s": one.stable,
-            "marched_unstable_s": one.unstable if np.isfinite(one.unstable) else None,
+            "marched_unstable_s": plain(one.unstable),
             "agrees": "yes" if one.agrees else "no",
         }
         for one in found.limits
@@ -324,7 +298,7 @@ def as_rows(found: StabilityMap) -> list[dict[str, Any]]:
 def as_text(found: StabilityMap) -> str:
     """A sentence for each coupling."""
     lines = [f"{found.case} at {found.place:.2f} m, where {meets(found)} {found.wire_mass:.3g} kg:"]
-    for coupling in COUPLINGS:
+    for coupling in theory.COUPLINGS:
         limits = found.of(coupling)
         agree = sum(one.agrees for one in limits)
         both = [one for one in limits if np.isfinite(one.theory) and one.marched < np.inf]
@@ -358,8 +332,7 @@ _STABLE, _ONLY_IMPLICIT = "#eef3e6", "#fbeee6"
 @figures.own_style()
 def draw(found: StabilityMap) -> Figure:
     """Largest step over contact stiffness and over head mass, both logarithmic."""
-    figure = figures.new_figure(5.6)
-    left, right = figure.subplots(1, 2, sharey=True)
+    figure, (left, right) = figures.panels(5.6, 1, 2, sharey=True)
     masses, stiffnesses = found.grid.few_masses, found.grid.few_stiffnesses
     by_mass = [(f"head {mass:g} kg", {"head_mass": mass}) for mass in masses]
     by_stiffness = [(f"contact {_power(k)} N/m", {"stiffness": k}) for k in stiffnesses]

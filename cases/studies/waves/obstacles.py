@@ -42,29 +42,39 @@ _HALVES = 1.9
 _KEPT = frozenset({"vertical", "dropper_mass", "clamp_mass", "arm_inertia", "arm_stiffness"})
 
 
-class Bench(NamedTuple):
-    """Long wires with one obstacle at `HALF` and without anything else, on which one pulse runs.
+Part = Droppers | SteadyArms | Supports
+
+
+class Obstacle(NamedTuple):
+    """An obstacle alone on its wires, its springs and masses in theory.
+
+    Its bench is these wires with the obstacle at `HALF`, along which one pulse runs.
 
     Attributes
     ----------
+    name : in tables
     wires : they are what waves run on, in this order
-    parts : the obstacle: groups of one member each, empty for none
+    stiffness, mass : (n, n) between its wires [N/m], [kg]; not of an end or a change of wire
+    parts : groups of one member each that it is made of on the bench
     dropper_length : of the dropper, if it is one [m]
     beyond : conductor of the first wire beyond the obstacle, None for the same
     ends : whether the wires end at the obstacle, held
     """
 
+    name: str
     wires: tuple[Wire, ...]
-    parts: tuple[Droppers | SteadyArms | Supports, ...] = ()
+    stiffness: np.ndarray
+    mass: np.ndarray
+    parts: tuple[Part, ...] = ()
     dropper_length: float = 1.0
     beyond: Conductor | None = None
     ends: bool = False
 
 
 def measured(
-    bench: Bench, problem: Problem, frequency: np.ndarray
+    obstacle: Obstacle, problem: Problem, frequency: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run a pulse on each wire of a bench and measure reflected and transmitted waves. Serial.
+    """Run a pulse on each wire of the bench and measure reflected and transmitted waves. Serial.
 
     On each wire the incoming and the reflected pulse are measured before the obstacle, the
     transmitted one beyond it; windows in time separate them. As in the theory there is no damping,
@@ -72,7 +82,7 @@ def measured(
 
     Parameters
     ----------
-    bench : wires and obstacle
+    obstacle : with its wires
     problem : problem whose effects give masses and springs of the obstacle
     frequency : (f,) > 0 [Hz]
 
@@ -83,34 +93,36 @@ def measured(
     omega : (f,) angular frequencies of the discrete motion, (2 / dt) tan(w dt / 2) for the angular
         frequency w and steps of average acceleration [1/s]
     """
-    model = _model(bench, problem)
-    n, f = len(bench.wires), frequency.size
+    model = _model(obstacle, problem)
+    n, f = len(obstacle.wires), frequency.size
     omega = 2 * np.pi * frequency
     seen = 2.0 / DT * np.tan(0.5 * omega * DT)
     back, onward = np.zeros((2, f, n, n), dtype=complex)
-    delays = [answer_of(wire, seen).wavenumber * STATION for wire in bench.wires]
-    beyond = [answer_of(bench.beyond or wire, seen).wavenumber * STATION for wire in bench.wires]
+    delays = [answer_of(wire, seen).wavenumber * STATION for wire in obstacle.wires]
+    beyond = [
+        answer_of(obstacle.beyond or wire, seen).wavenumber * STATION for wire in obstacle.wires
+    ]
     for struck in range(n):
-        time, before, behind = _signals(bench, model, struck)
+        time, before, behind = _signals(obstacle, model, struck)
         change = np.exp(-1j * omega[:, None] * time)
-        split = 2.0 * STATION / bench.wires[struck].wave_speed
+        split = 2.0 * STATION / obstacle.wires[struck].wave_speed
         came = change @ np.where(time < split, before[struck], 0.0)
         for other in range(n):
             returned = change @ np.where(time < split, 0.0, before[other])
             late = np.exp(1j * (delays[struck] + delays[other]))
             back[:, other, struck] = returned / came * late
-            if not bench.ends:
+            if not obstacle.ends:
                 late = np.exp(1j * (delays[struck] + beyond[other]))
                 onward[:, other, struck] = change @ behind[other] / came * late
     return back, onward, seen
 
 
-def _model(bench: Bench, problem: Problem) -> Model:
-    """The bench as a model."""
-    length = HALF if bench.ends else 2 * HALF
-    masts = (0.0, length) if bench.ends else (0.0, HALF, length)
+def _model(obstacle: Obstacle, problem: Problem) -> Model:
+    """The obstacle on its bench as a model."""
+    length = HALF if obstacle.ends else 2 * HALF
+    masts = (0.0, length) if obstacle.ends else (0.0, HALF, length)
     wires = []
-    for number, wire in enumerate(bench.wires):
+    for number, wire in enumerate(obstacle.wires):
         # Heights are of no effect, but droppers have a length.
         height = 5.0 + number
         piece = Piece(masts, (0.0,) * len(masts), (height,) * len(masts))
@@ -123,20 +135,20 @@ def _model(bench: Bench, problem: Problem) -> Model:
         (0, 0),
         "bench",
         tuple(wires),
-        tuple(part for part in bench.parts if isinstance(part, Droppers)),
-        tuple(part for part in bench.parts if isinstance(part, SteadyArms)),
-        tuple(part for part in bench.parts if isinstance(part, Supports)),
+        tuple(part for part in obstacle.parts if isinstance(part, Droppers)),
+        tuple(part for part in obstacle.parts if isinstance(part, SteadyArms)),
+        tuple(part for part in obstacle.parts if isinstance(part, Supports)),
     )
-    bends = min(np.sqrt(wire.bending_stiffness / wire.tension) for wire in bench.wires)
+    bends = min(np.sqrt(wire.bending_stiffness / wire.tension) for wire in obstacle.wires)
     # A whole number of them up to the stations, too.
     a_station = round(STATION / float(np.clip(2.0 * bends, _SHORTEST, _LONGEST)))
     mesh = make_mesh(line, a_station * round(HALF / STATION))
     alone = replace(
         problem, line=line, damping=Damping(0.0, 0.0), effects=problem.effects & _KEPT, incidents=()
     )
-    model = build(alone, mesh, np.full(mesh.droppers.shape[0], bench.dropper_length))
-    if bench.beyond is not None:
-        _change(model, bench.wires[0], bench.beyond)
+    model = build(alone, mesh, np.full(mesh.droppers.shape[0], obstacle.dropper_length))
+    if obstacle.beyond is not None:
+        _change(model, obstacle.wires[0], obstacle.beyond)
     return model
 
 
@@ -153,21 +165,21 @@ def _change(model: Model, wire: Wire, beyond: Conductor) -> None:
 
 
 def _signals(
-    bench: Bench, model: Model, struck: int
+    obstacle: Obstacle, model: Model, struck: int
 ) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
     """Times (t,), and deflections (t,) of each wire at the stations before and behind."""
-    displacement, velocity = _pulse(bench.wires[struck], model)
+    displacement, velocity = _pulse(obstacle.wires[struck], model)
     factor = splu(whole_matrix(model, mass=1.0, held_diagonal=1.0))
     acceleration = factor.solve(-(whole_matrix(model, stiffness=1.0) @ displacement))
     rows = []
     for place in (HALF - STATION, HALF + STATION):
-        nodes = [model.mesh.wires[wire.name] for wire in bench.wires]
+        nodes = [model.mesh.wires[wire.name] for wire in obstacle.wires]
         at = [own[np.argmin(np.abs(model.mesh.x(own) - place))] for own in nodes]
         rows.append(model.dofs(np.array(at)))
-    beyond = [] if bench.beyond is None else [bench.beyond]
-    lasts = _HALVES * HALF / max(wire.wave_speed for wire in [*bench.wires, *beyond])
+    beyond = [] if obstacle.beyond is None else [obstacle.beyond]
+    lasts = _HALVES * HALF / max(wire.wave_speed for wire in [*obstacle.wires, *beyond])
     time = DT * np.arange(int(lasts / DT))
-    found = np.empty((time.size, 2, len(bench.wires)))
+    found = np.empty((time.size, 2, len(obstacle.wires)))
     numerics = Numerics(DT, "one_solve", 0.25, 0.5, 1e-9, 1e-9, 1)
     line = make_line(MPI.COMM_SELF, model, distribute(model, 1, 0), numerics)
     try:
@@ -210,22 +222,6 @@ FREQUENCIES = np.arange(2.0, HIGHEST + 0.5, 0.5)
 # Shares below these are compared with them and not with themselves, what comes back and what goes
 # on: see `Result.error`.
 LEAST = (0.01, 0.1)
-
-
-class Obstacle(NamedTuple):
-    """An obstacle as a bench, and its springs and masses in theory.
-
-    Attributes
-    ----------
-    name : in tables
-    bench : it alone on its wires
-    stiffness, mass : (n, n) between its wires [N/m], [kg]; not of an end or a change of wire
-    """
-
-    name: str
-    bench: Bench
-    stiffness: np.ndarray
-    mass: np.ndarray
 
 
 class Result(NamedTuple):
@@ -275,16 +271,13 @@ def obstacles_of(rest: LineAtRest) -> list[Obstacle]:
         tension = np.median(rest.form.dropper_force[mine], keepdims=True)
         k = float(slopes.at(slopes.piece_under(tension)).slope[0])
         spring = replace(group.kind, stiffness=k, axial_stiffness=None, curve=None)
-        part = replace(group, kind=spring, upper_x=(HALF,), lower_x=(HALF,))
-        found.append(
-            Obstacle(
-                f"{group.name} ({length:.2f} m)", Bench(wires, (part,), length),
-                k * np.array([[1.0, -1.0], [-1.0, 1.0]]), np.diag(masses),
-            )
-        )  # fmt: skip
+        part: Part = replace(group, kind=spring, upper_x=(HALF,), lower_x=(HALF,))
+        springs = k * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        name = f"{group.name} ({length:.2f} m)"
+        found.append(Obstacle(name, wires, springs, np.diag(masses), (part,), length))
     for support in line.supports:
-        bench = Bench((line.wire(support.wire),), (replace(support, x=(HALF,)),))
-        found.append(_alone(support.name, bench, support.stiffness, 0.0))
+        part = replace(support, x=(HALF,))
+        found.append(_on_one(support.name, line.wire(support.wire), support.stiffness, 0.0, part))
     for arms in line.steady_arms:
         kind = arms.kind
         moves = kind.mass_per_length * kind.length / 3.0 + kind.clamp_mass
@@ -293,30 +286,32 @@ def obstacles_of(rest: LineAtRest) -> list[Obstacle]:
         of_each = arms.vertical_stiffness(line.wire(arms.wire))
         stiffness = float(of_each[0]) if "arm_stiffness" in on and of_each.size else 0.0
         alone = replace(kind, stiffness=stiffness, by_radial_force=False)
-        bench = Bench((line.wire(arms.wire),), (replace(arms, kind=alone, x=(HALF,)),))
-        found.append(_alone(arms.name, bench, stiffness, mass))
+        part = replace(arms, kind=alone, x=(HALF,))
+        found.append(_on_one(arms.name, line.wire(arms.wire), stiffness, mass, part))
     contact = line.wires[0]
     for above in line.wires[1:2]:
-        name = f"from {contact.name} to {above.name}"
-        found.append(_alone(name, Bench((contact,), beyond=above), 0.0, 0.0))
-    found.append(_alone("end", Bench((contact,), ends=True), 0.0, 0.0))
+        change = _on_one(f"from {contact.name} to {above.name}", contact)
+        found.append(change._replace(beyond=above))
+    found.append(_on_one("end", contact)._replace(ends=True))
     return found
 
 
-def _alone(name: str, bench: Bench, stiffness: float, mass: float) -> Obstacle:
-    return Obstacle(name, bench, np.array([[stiffness]]), np.array([[mass]]))
+def _on_one(
+    name: str, wire: Wire, stiffness: float = 0.0, mass: float = 0.0, *parts: Part
+) -> Obstacle:
+    return Obstacle(name, (wire,), np.array([[stiffness]]), np.array([[mass]]), parts)
 
 
 def result_of(obstacle: Obstacle, problem: Problem, frequency: np.ndarray = FREQUENCIES) -> Result:
     """Measure the shares that an obstacle sends back and onward at each ``frequency`` (n,) [Hz], on
     the line of a ``problem``, and put theory beside them. Serial."""
-    bench, wires = obstacle.bench, obstacle.bench.wires
-    seen_back, seen_onward, omega = measured(bench, problem, frequency)
-    if bench.ends:
+    wires = obstacle.wires
+    seen_back, seen_onward, omega = measured(obstacle, problem, frequency)
+    if obstacle.ends:
         # Held, free to turn: the wave comes back turned over.
         back, onward = -np.ones((omega.size, 1, 1)), np.zeros((omega.size, 1, 1))
-    elif bench.beyond is not None:
-        returned, passed = change_of_wire(wires[0], bench.beyond, omega)
+    elif obstacle.beyond is not None:
+        returned, passed = change_of_wire(wires[0], obstacle.beyond, omega)
         back, onward = returned[:, None, None], passed[:, None, None]
     else:
         squares = (omega**2)[:, None, None]
@@ -349,8 +344,9 @@ _MARKS = "o^svxD"
 @figures.own_style()
 def picture(results: list[Result]) -> Figure:
     """Sizes of the shares over frequency: theory as lines, what is measured as marks."""
-    figure = figures.new_figure(2.0 + 2.4 * ((len(results) + 1) // 2))
-    panels = figure.subplots((len(results) + 1) // 2, 2, squeeze=False).ravel()
+    n_rows = (len(results) + 1) // 2
+    figure, grid = figures.panels(2.0 + 2.4 * n_rows, n_rows, 2, squeeze=False)
+    panels = grid.ravel()
     for result, axes in zip(results, panels, strict=False):
         for number, (label, shares) in enumerate(_curves(result)):
             # Marks tell curves apart in black and white, too.

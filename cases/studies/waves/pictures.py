@@ -35,8 +35,7 @@ def space_time(
     supports : places of supports [m]
     what : name of what moves, for the legend
     """
-    figure = figures.new_figure(6.4)
-    axes = figure.add_subplot()
+    figure, axes = figures.panels(6.4)
     _velocity(figure, axes, seen.x, seen.time, seen.velocity)
     for p in range(seen.position.shape[1]):
         label = what if p == 0 else None
@@ -72,8 +71,7 @@ def train_frame(
     behind, ahead : distances that are shown [m]
     what : name of what distances count from, for the axis
     """
-    figure = figures.new_figure(6.4)
-    axes = figure.add_subplot()
+    figure, axes = figures.panels(6.4)
     relative, velocity = seen.in_the_train(behind, ahead)
     _velocity(figure, axes, relative, seen.time, velocity)
     when = seen.time[0] + 0.3 * np.ptp(seen.time)
@@ -89,8 +87,7 @@ def train_frame(
         label = ""
     axes.set_xlim(-behind, ahead)
     axes.set_ylim(seen.time[0], seen.time[-1])
-    figures.tidy(axes, f"distance from the {what} [m]", "time [s]")
-    figures.legend_above(axes)
+    figures.tidy(axes, f"distance from the {what} [m]", "time [s]", legend=True)
     return figure
 
 
@@ -98,8 +95,7 @@ def train_frame(
 def wavenumbers(seen: WavesSeen, theory: WaveTheory, what: str = "train") -> Figure:
     """Amplitude of the velocity over wavenumber and frequency, with the waves of theory; ``what``
     names what moves."""
-    figure = figures.new_figure(6.4)
-    axes = figure.add_subplot()
+    figure, axes = figures.panels(6.4)
     k, frequency, amplitude = seen.spectrum()
     near, low = np.abs(k) <= _WIDEST, frequency <= HIGHEST
     level = np.log10(np.maximum(amplitude[np.ix_(low, near)], 10.0**-_DECADES))
@@ -137,8 +133,7 @@ def wavenumbers(seen: WavesSeen, theory: WaveTheory, what: str = "train") -> Fig
 @figures.own_style()
 def transmission(found: Transmitted) -> Figure:
     """Energy at two stations beyond a blow over frequency; pass bands are shaded."""
-    figure = figures.new_figure(4.2)
-    axes = figure.add_subplot()
+    figure, axes = figures.panels(4.2)
     for low, high in found.bands:
         axes.axvspan(low, high, color=figures.SHADE, zorder=0)
     for values, label, colour in (
@@ -161,8 +156,7 @@ def energy_parts(energy: EnergySeen, seen: WavesSeen, what: str) -> Figure:
 
     ``seen`` has the places of what moves; ``what`` is its name, for the axis.
     """
-    figure = figures.new_figure(6.4)
-    over_time, over_place = figure.subplots(2, 1)
+    figure, (over_time, over_place) = figures.panels(6.4, 2, 1)
     places = places_of(seen, energy.time)
     behind, between, ahead = energy.parts(places)
     labels = (
@@ -180,8 +174,7 @@ def energy_parts(energy: EnergySeen, seen: WavesSeen, what: str) -> Figure:
             )
     over_time.plot(energy.time, energy.total, color="black", linewidth=0.9, label="whole line")
     over_time.set_ylim(bottom=0.0)
-    figures.tidy(over_time, "time [s]", "energy of the line [J]")
-    figures.legend_above(over_time)
+    figures.tidy(over_time, "time [s]", "energy of the line [J]", legend=True)
     relative, mean = energy.around(places.max(axis=1), _AROUND)
     over_place.semilogy(relative, np.maximum(mean, 1e-12), color=figures.COLOURS[0], linewidth=1.2)
     positive = mean[mean > 0.0]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -110,11 +110,8 @@ def places_of(seen: WavesSeen, time: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(time, seen.time, course) for course in seen.position.T])
 
 
-class NodeMotion(Protocol):
-    """Takes the motion of all nodes, time after time."""
-
-    def add(self, time: float, moved: np.ndarray) -> None:
-        """Displacements of the nodes (n_nodes, 3) [m] at a time [s], later than the one before."""
+# Takes a time [s], later than the one before, and the displacements of the nodes (n_nodes, 3) [m].
+TakesMotion = Callable[[float, np.ndarray], None]
 
 
 class WireMotion:
@@ -132,7 +129,7 @@ class WireMotion:
         self._rows: list[np.ndarray] = []
 
     def add(self, time: float, moved: np.ndarray) -> None:
-        """Add the motion of the nodes at a time, as `NodeMotion.add`."""
+        """Add the motion of the nodes at a time, as `TakesMotion`."""
         self._times.append(time)
         row = np.interp(self.x, self._along, moved[self._nodes, 2])
         self._rows.append(row.astype(np.float32))
@@ -157,7 +154,7 @@ class WireMotion:
 
 
 def waves_seen(
-    data: FilmData, snapshots: Snapshots, others: Sequence[NodeMotion] = ()
+    data: FilmData, snapshots: Snapshots, others: Sequence[TakesMotion] = ()
 ) -> WavesSeen:
     """The motion of the lowest contact wire in the snapshots of a run, which ``others`` see too.
 
@@ -172,8 +169,8 @@ def waves_seen(
     wire = WireMotion(nodes, data.points[nodes, 0])
     for number, time in enumerate(snapshots.times.tolist()):
         moved = snapshots.displacement(number)
-        for one in (wire, *others):
-            one.add(time, moved)
+        for take in (wire.add, *others):
+            take(time, moved)
     if data.excitation is not None:
         return wire.seen(*course_of(data.excitation))
     return wire.seen(lambda times: data.position[[data.row_at(t) for t in times.tolist()]])
@@ -255,7 +252,7 @@ class EnergySeen:
 
 
 class EnergyMotion:
-    """Collects the energy of a line from the motion of its nodes; a `NodeMotion`.
+    """Collects the energy of a line from the motion of its nodes.
 
     Slopes are those of cubic splines through a wire's nodes. Between two snapshots the motion is
     their mean and the velocity their difference over the time between them: a wave of angular
@@ -294,7 +291,7 @@ class EnergyMotion:
         self._rows: list[np.ndarray] = []
 
     def add(self, time: float, moved: np.ndarray) -> None:
-        """Add the motion of the nodes at a time, as `NodeMotion.add`."""
+        """Add the motion of the nodes at a time, as `TakesMotion`."""
         now = moved[self._nodes]
         if self._before is not None:
             then, earlier = self._before

@@ -28,7 +28,7 @@ from catenary.cases.studies.waves import obstacles, pictures
 from catenary.cases.studies.waves.seen import (
     EnergyMotion,
     EnergySeen,
-    NodeMotion,
+    TakesMotion,
     WavesSeen,
     WireMotion,
     course_of,
@@ -122,7 +122,7 @@ def study_waves(folder: Path) -> tuple[str, list[Path]]:
                     "output.fields"
                 )
             energy = EnergyMotion(rest, numbers)
-            seen = waves_seen(data, snapshots, [energy])
+            seen = waves_seen(data, snapshots, [energy.add])
             ends = np.array([snapshots.moving(n) for n in range(snapshots.times.size)])
             moving = np.column_stack(
                 [np.maximum(ends[1:, 0], ends[:-1, 0]), np.minimum(ends[1:, 1], ends[:-1, 1])]
@@ -169,8 +169,9 @@ def study_excited(
 
     def watching(rest: LineAtRest) -> list[Observer]:
         wire = WireMotion(rest.model.contact_nodes, rest.model.contact_x)
-        found.append((rest, wire, EnergyMotion(rest)))
-        return [Watch(max(1, round(every / problem.numerics.dt)), found[-1][1:])]
+        energy = EnergyMotion(rest)
+        found.append((rest, wire, energy))
+        return [Watch(max(1, round(every / problem.numerics.dt)), [wire.add, energy.add])]
 
     run = ExcitedRun(without_train(problem, excitation), excitation, every, watching)
     ended = run_case(scene, folder, MPI.COMM_SELF, force=force, only_summary=True, excited=run)
@@ -276,34 +277,21 @@ def _energy_rows(energy: EnergySeen, seen: WavesSeen) -> list[Row]:
 def as_rows(theory: WaveTheory) -> list[Row]:
     """Figures with unit and meaning; those that the line does not have are left out."""
     of_string = "" if theory.by_bending else ", sqrt(T / m)"
-    doppler = "Doppler factor of an echo from ahead, (c - v) / (c + v)"
-    sent_back = "reflection coefficient of a stiff dropper on the contact wire, Z_m / (Z_c + Z_m)"
-    grows = (
-        "amplification of a wave between head and dropper, reflection coefficient / Doppler factor"
-    )
+    fastest, at = (np.nan, np.nan) if theory.bloch is None else theory.bloch.fastest(20.0)
     rows = [
         ("train_speed", theory.speed, "m/s", "speed of the train"),
         ("wave_speed", theory.wave_speed, "m/s", f"slowest wave of the contact wire{of_string}"),
-        ("doppler_factor", theory.doppler, "-", doppler),
-        ("dropper_reflection", theory.reflection, "-", sent_back),
-        ("amplification", theory.amplification, "-", grows),
-    ]
-    if theory.bloch is not None:
-        speed, at = theory.bloch.fastest(20.0)
-        rows += [
-            (
-                "fastest_group_velocity",
-                speed,
-                "m/s",
-                "greatest group velocity of the periodic line up to 20 Hz",
-            ),
-            (
-                "frequency_of_the_fastest",
-                at,
-                "Hz",
-                "frequency of the wave with the greatest group velocity",
-            ),
-        ]
+        ("doppler_factor", theory.doppler, "-",
+         "Doppler factor of an echo from ahead, (c - v) / (c + v)"),
+        ("dropper_reflection", theory.reflection, "-",
+         "reflection coefficient of a stiff dropper on the contact wire, Z_m / (Z_c + Z_m)"),
+        ("amplification", theory.amplification, "-", "amplification of a wave between head and "
+         "dropper, reflection coefficient / Doppler factor"),
+        ("fastest_group_velocity", fastest, "m/s",
+         "greatest group velocity of the periodic line up to 20 Hz"),
+        ("frequency_of_the_fastest", at, "Hz",
+         "frequency of the wave with the greatest group velocity"),
+    ]  # fmt: skip
     return [row_of(*row) for row in rows if np.isfinite(row[1])]
 
 
@@ -387,13 +375,9 @@ def _force_of(settings: Excited, problem: Problem) -> float:
 def _moving_force(settings: Excited, problem: Problem, dt: float) -> MovingForce:
     """A force that moves with the train."""
     train = problem.train
-    frequency = settings.frequency or 0.0
-    highest = 0.1 / dt
-    if not 0.0 <= frequency <= highest:
-        raise InputError(
-            f"--frequency-Hz is {frequency:g}, but must be from 0 to {highest:g}, ten time "
-            "steps a period"
-        )
+    frequency, highest = settings.frequency or 0.0, 0.1 / dt
+    allowed = f"be from 0 to {highest:g}, ten time steps a period"
+    _refuse_unless(0.0 <= frequency <= highest, "--frequency-Hz", frequency, allowed)
     force = _force_of(settings, problem)
     _refuse_too_strong("--force-N", force, force)
     return MovingForce(force, frequency, train.start, train.speed, train.raise_time)
@@ -407,16 +391,12 @@ def _blow(kind: str, settings: Excited, problem: Problem, dt: float) -> Blow:
             "take exact, or off"
         )
     duration = DURATIONS[kind] if settings.duration is None else settings.duration
-    if not 10 * dt <= duration <= 10.0:
-        raise InputError(
-            f"--duration-s is {duration:g}, but must be from {10 * dt:g}, ten time steps, to 10"
-        )
+    allowed = f"be from {10 * dt:g}, ten time steps, to 10"
+    _refuse_unless(10 * dt <= duration <= 10.0, "--duration-s", duration, allowed)
     ends = problem.line.support_positions[[0, -1]]
     at = float(ends.mean()) if settings.at is None else settings.at
-    if not ends[0] < at < ends[1]:
-        raise InputError(
-            f"--at-m is {at:g}, but must lie on the line, from {ends[0]:g} to {ends[1]:g} m"
-        )
+    allowed = f"lie on the line, from {ends[0]:g} to {ends[1]:g} m"
+    _refuse_unless(bool(ends[0] < at < ends[1]), "--at-m", at, allowed)
     if kind == HAMMER:
         impulse = IMPULSE if settings.impulse is None else settings.impulse
         blow = hammer(at, impulse, duration)
@@ -425,6 +405,11 @@ def _blow(kind: str, settings: Excited, problem: Problem, dt: float) -> Blow:
     force = _force_of(settings, problem)
     _refuse_too_strong("--force-N", force, force)
     return Blow(at, duration, force, False)
+
+
+def _refuse_unless(is_allowed: bool, option: str, value: float, allowed: str) -> None:
+    if not is_allowed:
+        raise InputError(f"{option} is {value:g}, but must {allowed}")
 
 
 def _refuse_too_strong(option: str, value: float, peak: float) -> None:
@@ -472,7 +457,7 @@ class Watch(Observer):
     seen : receivers of the motion
     """
 
-    def __init__(self, every: int, seen: Sequence[NodeMotion]) -> None:
+    def __init__(self, every: int, seen: Sequence[TakesMotion]) -> None:
         self._every, self._seen = every, seen
 
     def start(self, stage: Stage) -> None:
@@ -494,5 +479,5 @@ class Watch(Observer):
             moved = np.zeros((self._nodes.size, 3))
             for axis, name in self._axes:
                 moved[self._nodes, axis] = view.node_motion(name, False)
-            for one in self._seen:
-                one.add(view.time, moved)
+            for take in self._seen:
+                take(view.time, moved)

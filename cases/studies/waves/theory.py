@@ -195,8 +195,8 @@ def draw_reflections(
     found: list[EndReflection], ends: tuple[EndCondition, EndCondition], speed: float
 ) -> Figure:
     """Reflection by both ends over frequency; waves faster than ``speed`` [m/s] are filled."""
-    figure = figures.new_figure(4.2)
-    axes = figure.add_subplot()
+    figure, axes = figures.panels(4.2)
+    rings: dict[str, Any] = {"facecolors": "none", "linewidths": 0.5}
     for number, (side, end, kind) in enumerate(zip(SIDES, found, ends, strict=False)):
         frequency = np.broadcast_to(end.frequency[:, None], end.reflected.shape)
         there = np.isfinite(end.reflected)
@@ -205,19 +205,13 @@ def draw_reflections(
         # The start is drawn larger, to be seen beneath an end that sends back as much.
         colour, marker, size = figures.COLOURS[number], "os"[number], (26.0, 6.0)[number]
         name = f"{side}, {_name(kind)}"
-        slow = there & ~fast
-        axes.scatter(
-            frequency[slow], shown[slow], s=size, marker=marker, facecolors="none",
-            edgecolors=colour, linewidths=0.5, alpha=0.6,
-        )  # fmt: skip
-        axes.scatter(
-            frequency[fast], shown[fast], s=size, marker=marker, color=colour, linewidths=0,
-            label=f"{name}: waves faster than the train",
-        )  # fmt: skip
-    axes.scatter(
-        [], [], s=8.0, facecolors="none", edgecolors=figures.GREY, linewidths=0.5,
-        label="slower waves",
-    )  # fmt: skip
+        label = f"{name}: waves faster than the train"
+        for which, how in (
+            (there & ~fast, rings | {"edgecolors": colour, "alpha": 0.6}),
+            (fast, {"color": colour, "linewidths": 0, "label": label}),
+        ):
+            axes.scatter(frequency[which], shown[which], s=size, marker=marker, **how)
+    axes.scatter([], [], s=8.0, edgecolors=figures.GREY, label="slower waves", **rings)
     axes.axhline(_LITTLE**0.5, color=figures.GREY, linewidth=0.8, linestyle="--", zorder=0)
     axes.annotate(
         f"{100.0 * _LITTLE:g} % of the energy reflected", (HIGHEST, _LITTLE**0.5), (-3.0, 2.0),

@@ -144,8 +144,7 @@ def files_of(curves: Sequence[Curve]) -> dict[str, Content]:
 @figures.own_style()
 def draw(curves: Sequence[Curve]) -> Figure:
     """Errors over size; the window that the program chooses is a star, its estimates are dotted."""
-    figure = figures.new_figure(4.6)
-    axes = figure.add_subplot()
+    figure, axes = figures.panels(4.6)
     for number, curve in enumerate(curves):
         spans = [one.spans for one in curve.errors]
         history = [one.history for one in curve.errors]

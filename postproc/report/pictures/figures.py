@@ -10,7 +10,7 @@ import contextlib
 import io
 import logging
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from textwrap import fill
 from typing import Any
 
@@ -122,6 +122,22 @@ def new_figure(height: float) -> Figure:
     return figure
 
 
+def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[Figure, Any]:
+    """A figure as of ``new_figure`` and its panels, as ``Figure.subplots`` gives them for ``how``.
+
+    Parameters
+    ----------
+    height : float
+        Height of the figure [inch].
+    rows, columns : int, optional
+        Number of panels one below the other and side by side.
+    **how : dict
+        Further arguments of Matplotlib's ``subplots``.
+    """
+    figure = new_figure(height)
+    return figure, figure.subplots(rows, columns, **how)
+
+
 def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, list[Axes]]:
     """A figure of the report's width with ``n`` panels one below the other, and the panels.
 
@@ -159,24 +175,13 @@ def stacked(height: float, n: int, *, shared: bool = False) -> tuple[Figure, lis
     return figure, list(panels[:, 0])
 
 
-def colour(pantograph: int) -> str:
-    """Colour of a pantograph, the same in all pictures."""
-    return COLOURS[pantograph % len(COLOURS)]
+def _in_turns(looks: Sequence[str]) -> Callable[[int], str]:
+    """Looks by the number of a pantograph or curve, after the last one the first again."""
+    return lambda number: looks[number % len(looks)]
 
 
-def line(number: int) -> str:
-    """Line of a curve in a panel of several."""
-    return LINES[number % len(LINES)]
-
-
-def mark(number: int) -> str:
-    """Mark of a curve in a panel of several."""
-    return MARKS[number % len(MARKS)]
-
-
-def hatch(number: int) -> str:
-    """Hatching of bars in a panel of several."""
-    return HATCHES[number % len(HATCHES)]
+# Colour of a pantograph, the same in all pictures; line, mark and hatching in a panel of several.
+colour, line, mark, hatch = map(_in_turns, (COLOURS, LINES, MARKS, HATCHES))
 
 
 def curve(

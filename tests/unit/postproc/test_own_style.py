@@ -26,7 +26,7 @@ FOREIGN = {
 }
 
 
-MAKERS = ("stacked", "new_figure", "Figure")  # functions of which each makes a figure
+MAKERS = ("stacked", "new_figure", "panels", "Figure")  # functions of which each makes a figure
 
 
 def test_every_function_that_makes_a_figure_does_so_in_the_own_style() -> None:
