@@ -173,7 +173,7 @@ class LineRecord(BaseModel):
     """
 
     model_config = ConfigDict(
-        frozen=True, validate_by_name=True, alias_generator=lambda name: _IN_FILE.get(name, name)
+        frozen=True, populate_by_name=True, alias_generator=lambda name: _IN_FILE.get(name, name)
     )
 
     every: Annotated[int, Field(ge=1, le=10**9)] = 1

@@ -27,7 +27,7 @@ PACKAGES = (
     # Of the program, with what they import:
     "catenary.cases.cli.main", "catenary.cases.run.needs",
     "catenary.cases.run.scene_mesh", "catenary.cases.scene.load",
-    "catenary.postproc.evaluate.filters", "catenary.solver.contact_problem.coupling",
+    "catenary.postproc.evaluate.filters", "catenary.solver.contact_problem.law_tangents",
     "catenary.solver.statics.form_finding", "catenary.solver.kernels.native",
 )  # fmt: skip
 
