@@ -189,10 +189,10 @@ def _said(path: Path, function: Callable[..., Any], *given: Any) -> Any:
         raise
     except Exception as error:  # whatever a person's own file does wrong
         frames = traceback.extract_tb(error.__traceback__)
-        line = max((n for n, one in enumerate(frames) if one.filename == str(path)), default=0)
+        own = [one.lineno for one in frames if one.filename == str(path)]
+        line = f" in line {own[-1]}" if own else ""
         raise InputError(
-            f"{function.__name__} of {path} fails in line {frames[line].lineno}: "
-            f"{type(error).__name__}: {error}"
+            f"{function.__name__} of {path} fails{line}: {type(error).__name__}: {error}"
         ) from error
 
 

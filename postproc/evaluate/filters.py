@@ -142,4 +142,9 @@ def _both_ways(sections: np.ndarray, values: np.ndarray, dt: float, slowest: flo
     if not len(values):
         return values.copy()
     padding = min(len(values) - 1, int(np.ceil(SETTLED / (slowest * dt))))
-    return np.asarray(signal.sosfiltfilt(sections, values, axis=0, padlen=padding))
+
+    def filtered(column: np.ndarray) -> np.ndarray:
+        return np.asarray(signal.sosfiltfilt(sections, column, padlen=padding))
+
+    # One column after the other: SciPy's filter needs three times the memory of what it filters.
+    return np.apply_along_axis(filtered, 0, values)

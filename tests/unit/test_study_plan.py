@@ -75,6 +75,10 @@ def test_a_study_has_no_options_of_a_run(option: str, tmp_path: Path) -> None:
         ("def variants(\n", "cannot be loaded: SyntaxError"),
         ("import no_such_module\n", "cannot be loaded: ModuleNotFoundError"),
         (OWN_STUDY.format("[][1]", "{}"), "variants of .*study.py fails in line 4: IndexError: "),
+        (
+            OWN_STUDY.format("[]", "{}").replace("(scene, shortened)", "(scene)"),
+            "variants of .*study.py fails: TypeError: ",  # its caller's line is not the user's
+        ),
         (OWN_STUDY.format("[]", "{}"), "variants of .*study.py must give a list of StudyVariant, "),
         (
             OWN_STUDY.format("[1]", "{}"),

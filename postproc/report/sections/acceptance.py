@@ -7,6 +7,7 @@ from shlex import quote
 
 import numpy as np
 
+from catenary.postproc.evaluate.statistics import PantographStatistics
 from catenary.postproc.evaluate.verdict import Criterion, judged_by, labels
 from catenary.postproc.evaluate.wording import decimals_that_tell
 from catenary.postproc.report.page import EvaluatedRun, Section, Text, number
@@ -90,14 +91,14 @@ def errors_of(run: EvaluatedRun) -> dict[str, dict[str, float]]:
     if run.measured:
         names = ["", *(one.name for one in run.statistics.pantographs)]
         return {quantity: dict.fromkeys(names, error) for quantity, error in run.measured.items()}
-    return _by_rms(run, run.indicators.force_error)
+    return _by_rms(zip(run.statistics.pantographs, run.indicators.force_error, strict=True))
 
 
-def _by_rms(run: EvaluatedRun, errors: Iterable[float]) -> dict[str, dict[str, float]]:
-    """Errors by quantity and pantograph, from rms errors of the force histories [N]."""
-    pairs = list(zip(run.statistics.pantographs, errors, strict=False))
+def _by_rms(pairs: Iterable[tuple[PantographStatistics, float]]) -> dict[str, dict[str, float]]:
+    """Errors by quantity and pantograph, from pantographs and rms errors of their force [N]."""
+    by_name = {one.name: float(error) for one, error in pairs}
     return {
-        quantity: {one.name: factor * float(error) for one, error in pairs}
+        quantity: {name: factor * error for name, error in by_name.items()}
         for quantity, factor in _TIMES_RMS.items()
     }
 
@@ -192,7 +193,7 @@ def _start_up(run: EvaluatedRun) -> dict[str, dict[str, float]]:
     """
     facts = run.results.attributes.get("arrivals", {}).get("pantographs", [])
     pairs = zip(run.statistics.pantographs, facts, strict=False)
-    return _by_rms(run, [fact["start_share_of_std"] * one.std for one, fact in pairs])
+    return _by_rms((one, fact["start_share_of_std"] * one.std) for one, fact in pairs)
 
 
 def section(run: EvaluatedRun) -> Section:
