@@ -50,6 +50,8 @@ _FORCES = {
 }
 # Half of the last digit of a height's change [mm]: a smaller one is round-off, which has no place.
 _SEEN_HEIGHT_MM = 0.5e-3
+# Changes of height are equal within this share: differences of found forms agree to some 1e-8.
+_EQUAL = 1e-6
 
 
 @dataclass
@@ -502,7 +504,9 @@ def _rest_table(found: RestSensitivity) -> StudyTable:
     rows = []
     for m, parameter in enumerate(found.parameters):
         moved = np.nan_to_num(found.by_height[m])
-        place, wire = np.unravel_index(np.abs(moved).argmax(), moved.shape)
+        # The first of equal ones: a span may be symmetric, but for round-off.
+        largest = np.abs(moved) >= (1.0 - _EQUAL) * np.abs(moved).max()
+        place, wire = np.argwhere(largest)[0]
         change = parameter.change
         height = _MM * change * float(moved[place, wire])
         rows.append(
