@@ -28,9 +28,9 @@ from catenary.cases.scene.keys.keys import (
     known_keys,
     list_of,
     names_value,
+    place_of,
     schema_faults,
     unknown_key,
-    with_kinds,
 )
 from catenary.cases.scene.scene import Scene
 
@@ -73,7 +73,7 @@ class Draft:
         for key, value, where in values:
             known = known_keys(Scene)
             if not names_value(key, known):
-                near = known_keys(Scene, with_kinds(key, raw, Scene))
+                near = known_keys(Scene, place_of(key.split("."), raw, Scene).location)
                 raise InputError(unknown_key(key, where, near))
             if not is_known(key, known):
                 _refuse_without_entry(raw, key, where)
