@@ -324,7 +324,8 @@ def _array_script(
     from catenary.cases.run.cluster import array_script
     from catenary.cases.run.needs import total_needs
     from catenary.cases.studies.case_study import make_plan
-    from catenary.cases.studies.sweep.sweep import whole_runs_of
+    from catenary.cases.studies.sweep.jobs import whole_runs_of
+    from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 
     chosen, options = words.split()
     if study:
@@ -334,7 +335,8 @@ def _array_script(
         verb = ["run", *case_words, "--study"]
     else:
         variants = read_variants(vary, named)
-        jobs = whole_runs_of(words.draft()[0], variants, out).jobs
+        jobs = whole_runs_of(words.draft()[0], variants).jobs
+        refuse_other_sweep(out, variants, force=False)
         verb = ["sweep", *case_words, *(word for text in vary or [] for word in ("--vary", text))]
         verb += [] if named is None else ["--variants", str(named.absolute())]
     needs = total_needs(each.scene for each in jobs)

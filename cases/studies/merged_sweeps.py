@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel
-
 from catenary.base.errors import InputError
 from catenary.base.files import is_there
 from catenary.cases.scene.input.faults import shown
@@ -16,7 +14,7 @@ from catenary.cases.studies.sampling.tables import SamplingTable
 from catenary.cases.studies.sweep.histories import FILE as HISTORIES
 from catenary.cases.studies.sweep.histories import merge_histories
 from catenary.cases.studies.sweep.output import table_files
-from catenary.cases.studies.sweep.sweep import RECORD, other_value
+from catenary.cases.studies.sweep.sweep import RECORD, Record, other_value
 from catenary.cases.studies.uncertainty import output
 from catenary.cases.studies.uncertainty.evaluation import Uncertainty
 from catenary.cases.studies.uncertainty.run_table import read_sampling_beside
@@ -134,22 +132,6 @@ def write(out: Path, merged: Merged) -> Written:
     return Written(files, found, lacks)
 
 
-class _Variant(BaseModel):
-    name: str
-    assignments: Any
-
-
-class _Record(BaseModel):
-    """Record of a sweep, as far as it is read."""
-
-    case: str
-    varied: list[Any]
-    wall_s: float
-    variants: list[_Variant]
-    rows: list[dict[str, Any]]
-    scene: dict[str, Any] | None = None
-
-
 def _refuse_other_scene(
     folder: Path, record: dict[str, Any], of: Path, first: dict[str, Any]
 ) -> None:
@@ -174,12 +156,12 @@ def _record(folder: Path) -> dict[str, Any]:
     """The record of a sweep's folder, checked to be one."""
     path = folder / RECORD
     try:
-        found = _Record.model_validate_json(path.read_bytes())
+        found = Record.model_validate_json(path.read_bytes())
         whole = {frozenset(row) for row in found.rows} == {frozenset(found.rows[0])}
         whole = whole and all(isinstance(row.get("variant"), str) for row in found.rows)
     except OSError as error:
         raise InputError(f"{folder} holds no sweep: {path} cannot be read") from error
-    except (ValueError, IndexError, RecursionError):
+    except (ValueError, IndexError):
         whole = False
     if not whole:
         raise InputError(f"{path} is damaged; the sweep's command writes it again")

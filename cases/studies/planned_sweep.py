@@ -12,8 +12,17 @@ from catenary.base.parallel import on_root
 from catenary.cases.result_folder.folder_lock import held
 from catenary.cases.result_folder.output_folder import refuse_earlier
 from catenary.cases.scene.load import Draft
-from catenary.cases.studies.sweep.jobs import HISTORIES, Ended, Part, RunOptions, check_names
-from catenary.cases.studies.sweep.sweep import WholeRuns, refuse_other_sweep, whole_runs_of
+from catenary.cases.studies.sweep.jobs import (
+    HISTORIES,
+    Ended,
+    Part,
+    RunOptions,
+    WholeRuns,
+    check_names,
+    in_order,
+    whole_runs_of,
+)
+from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant
 from catenary.postproc.report.study_table import write_files
 
@@ -75,11 +84,23 @@ class PlannedSweep(NamedTuple):
 
         with held(self.out, comm, command):
             on_root(comm, lambda: refuse_earlier(self.out, options.force))
-            ended = self.own.run(self.out, comm, options)
+            ended = self._ended(comm, options)
             files, evaluated = on_root(
                 comm, lambda: self._write(ended, plotted, histogram), takes_long=True
             )
         return Swept(ended, files, evaluated)
+
+    def _ended(self, comm: Any, options: RunOptions, part: Part | None = None) -> list[Ended]:
+        """How all variants ended, in their order, or those of a part that can be run."""
+        from catenary.cases.studies.sweep.run_jobs import run_jobs
+
+        own = self.own
+        if not isinstance(own, WholeRuns):
+            return own.run(self.out, comm, options, part)
+        if part is not None:
+            return run_jobs(part.of(own.jobs), self.out, comm, options)
+        ended = run_jobs(own.jobs, self.out, comm, options)
+        return in_order(own.variants, ended, own.refused)
 
     def _write(
         self, ended: list[Ended], plotted: Sequence[str] | None, histogram: bool
@@ -111,7 +132,7 @@ class PlannedSweep(NamedTuple):
         from catenary.cases.studies.sweep.output import files_of
         from catenary.cases.studies.uncertainty.run_table import sampling_file
 
-        ended = self.own.run(self.out, comm, options, part)
+        ended = self._ended(comm, options, part)
         content = files_of(self.own.first.case.name, ended, None, scene=self.own.draft.table())
         if self.sampling is not None:
             content |= sampling_file(self.sampling)
@@ -147,20 +168,22 @@ def plan_sweep(
     Raises
     ------
     InputError
-        If one of ``histories`` is none, or whole runs are kept, which have them; as
-        ``whole_runs_of``.
+        If one of ``histories`` is none, or whole runs are kept, which have them; if the folder has
+        the table of another sweep, and ``force`` is not given; as ``whole_runs_of``.
     """
     check_names(histories, HISTORIES, "history")
+    own: WholeRuns | Ensemble
     if only_statistics:
         from catenary.cases.studies.sweep.together import ensemble_of
 
-        ensemble = ensemble_of(draft, variants, histories)
-        refuse_other_sweep(out, variants, force, draft)
-        return PlannedSweep(ensemble, out, sampling)
-    if histories:
+        own = ensemble_of(draft, variants, histories)
+    elif histories:
         raise InputError(
             f"{option('--histories', 'histories')} goes with "
             f"{option('--only-statistics', 'only_statistics')}: whole runs keep all in run.h5"
         )
-    runs = whole_runs_of(draft, variants, out, full_report=full_report, force=force)
-    return PlannedSweep(runs, out, sampling)
+    else:
+        own = whole_runs_of(draft, variants, full_report)
+    # Folders of whole runs are compared with the scene of each when it is their turn.
+    refuse_other_sweep(out, variants, force, draft if only_statistics else None)
+    return PlannedSweep(own, out, sampling)
