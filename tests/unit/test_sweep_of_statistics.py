@@ -19,8 +19,7 @@ from scenes import read_draft
 import catenary
 from catenary import InputError
 from catenary.cases.scene.load import Draft
-from catenary.cases.studies import merged_sweeps
-from catenary.cases.studies.planned_sweep import plan_sweep
+from catenary.cases.studies import sweeps
 from catenary.cases.studies.records import FOLDER
 from catenary.cases.studies.sweep.histories import KeptHistories
 from catenary.cases.studies.sweep.jobs import AS_USUAL, HISTORIES, Ended, Part
@@ -255,8 +254,8 @@ def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) ->
         part = Part(number, 2)
         _tables_of(draft, variants, out, part, kept)
         folders.append(out / part.folder)
-    merged = merged_sweeps.merge(folders[::-1])
-    written = merged_sweeps.write(tmp_path / "all", merged)
+    merged = sweeps.merge(folders[::-1])
+    written = sweeps.write_merged(tmp_path / "all", merged)
     assert tmp_path / "all" / "histories.h5" in written.files and not written.lacks
     with h5py.File(tmp_path / "all" / "histories.h5") as file:
         assert set(file) == set(whole)
@@ -269,7 +268,7 @@ def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) ->
                 # Scenes stand in lanes of other groups, which round-off tells apart.
                 np.testing.assert_allclose(rows, table, rtol=0.0, atol=1e-4)
     (folders[0] / "histories.h5").unlink()
-    written = merged_sweeps.write(tmp_path / "less", merged_sweeps.merge(folders))
+    written = sweeps.write_merged(tmp_path / "less", sweeps.merge(folders))
     assert written.lacks == f"histories are left out: {folders[0]} has none of {variants[0].name}"
     assert not (tmp_path / "less" / "histories.h5").exists()
 
@@ -282,7 +281,7 @@ def _tables_of(
     kept: tuple[str, ...],
 ) -> dict[str, np.ndarray]:
     """Histories of a sweep, or of a part of it."""
-    sweep = plan_sweep(draft, variants, out, only_statistics=True, histories=kept)
+    sweep = sweeps.plan_sweep(draft, variants, out, only_statistics=True, histories=kept)
     if part is None:
         sweep.run(MPI.COMM_SELF, AS_USUAL, "a test", None)
         folder = out

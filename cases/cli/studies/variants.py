@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from catenary.cases.scene.load import Draft
-    from catenary.cases.studies.planned_sweep import PlannedSweep
     from catenary.cases.studies.sweep.jobs import Ended
     from catenary.cases.studies.sweep.variants import Variant
+    from catenary.cases.studies.sweeps import PlannedSweep
     from catenary.optimising import Made
 
 _SHOWN_BROKEN, _SHOWN_REFUSED = 3, 20
@@ -109,8 +109,8 @@ def sweep(
     runs: StudyRuns,
 ) -> int:
     """Collective."""
-    from catenary.cases.studies.planned_sweep import plan_sweep
     from catenary.cases.studies.sweep.jobs import STATISTICS, check_names, parse_part
+    from catenary.cases.studies.sweeps import plan_sweep
     from catenary.sweeps import samples_of
 
     own = None if part is None else parse_part(part)
@@ -277,19 +277,19 @@ def merge(
     force: Force = False,
 ) -> None:
     """Serial."""
-    from catenary.cases.studies import merged_sweeps
+    from catenary.cases.studies import sweeps
     from catenary.cases.studies.sweep.sweep import RECORD
     from catenary.cases.studies.uncertainty import output
 
-    parts = merged_sweeps.parts_of(folders)
+    parts = sweeps.parts_of(folders)
     if len(parts) < 2:
         raise InputError(f"there is only {folders[0]} to merge: name at least two folders")
     refuse_impossible(out)
     # A sweep that runs there would replace the table when it ends.
     with held(out, alone(), "catenary merge"):
         refuse_table(out / RECORD, force)
-        merged = merged_sweeps.merge(parts)
-        files, found, lacks = merged_sweeps.write(out, merged)
+        merged = sweeps.merge(parts)
+        files, found, lacks = sweeps.write_merged(out, merged)
     if found is not None:
         console.say(output.as_text(found) + "\n")
     if lacks:
