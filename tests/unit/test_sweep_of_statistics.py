@@ -21,7 +21,7 @@ from catenary import InputError
 from catenary.cases.scene.load import Draft
 from catenary.cases.studies import sweeps
 from catenary.cases.studies.records import FOLDER
-from catenary.cases.studies.sweep.histories import KeptHistories
+from catenary.cases.studies.sweep.histories import KeptHistories, merge_histories, piece_file
 from catenary.cases.studies.sweep.jobs import AS_USUAL, HISTORIES, Ended, Part
 from catenary.cases.studies.sweep.output import force_histograms
 from catenary.cases.studies.sweep.together import pieces_of_work
@@ -295,6 +295,21 @@ def _tables_of(
 def test_histories_of_a_lost_process_are_waited_for(tmp_path: Path) -> None:
     KeptHistories(tmp_path, ["contact_force"], "sweep").join([], {tmp_path / "lost.h5": []})
     assert not list(tmp_path.iterdir())
+
+
+def test_histories_of_a_pantograph_whose_name_has_a_slash_are_merged(tmp_path: Path) -> None:
+    """HDF5 takes what stands before a slash for a group."""
+    variant = Variant("one", (), {"pantographs.a/b.static_force_N": "60"})
+    kept = KeptHistories(tmp_path / "one", ["contact_force"], "sweep")
+    piece = kept.file_of(variant.name)
+    with piece_file(piece, ["contact_force"]) as put:
+        tables = "time", "channels/contact_position", "channels/contact_force"
+        put(0, {name: np.zeros((3,) if name == "time" else (3, 1)) for name in tables})
+    kept.join([variant], {piece: [variant]})
+    files, lacks = merge_histories(tmp_path / "all.h5", {"one": tmp_path / "one"})
+    assert (files, lacks) == ([tmp_path / "all.h5"], "")
+    with h5py.File(tmp_path / "all.h5") as file:
+        assert file["pantographs.a_b.static_force_N"][...].tolist() == [60.0]
 
 
 @pytest.mark.process
