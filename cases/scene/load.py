@@ -81,6 +81,10 @@ class Draft:
             given.append((key, where))
         return replace(self, raw=raw, given=tuple(given))
 
+    def with_words(self, words: Iterable[Assigned]) -> Draft:
+        """This scene with further values in words, such as those of a command; as ``assigned``."""
+        return self.assigned((*parse_assignment(one.text, one.option), one.where) for one in words)
+
     def shortened(self) -> Draft:
         """Return the draft with the values of its ``[test]`` table."""
         raw = dict(self.raw)
@@ -138,39 +142,25 @@ def read_draft(case: str | Path, overrides: Sequence[str] = (), shortened: bool 
     path = find_case(str(case)).absolute()
     draft = Draft(read_toml(path), str(path), path.parent)
     draft = draft.shortened() if shortened else draft
-    return _assigned(draft, map(Assigned, overrides))
+    return draft.with_words(map(Assigned, overrides))
 
 
-def _assigned(draft: Draft, assigned: Iterable[Assigned]) -> Draft:
-    return draft.assigned((*parse_assignment(one.text, one.option), one.where) for one in assigned)
-
-
-def load_scene(
-    case: str | Path | Draft,
-    overrides: Sequence[str] = (),
-    shortened: bool = False,
-    varied: Sequence[Assigned] = (),
-) -> Scene:
+def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool = False) -> Scene:
     """The checked scene of a shipped case's name or a case file. Not collective.
 
     Parameters
     ----------
-    case : name, file or folder, or the draft read from one
+    case : name, file or folder
     overrides : ``key=value`` each, value in TOML; they replace values of the file; ``key=`` removes
         a key
     shortened : apply the case's ``[test]`` table before the overrides
-    varied : further assignments, applied last, with the place where each was written
 
     Raises
     ------
     InputError
         If anything is wrong: a ``SceneError`` with all faults of the scene, or one sentence.
     """
-    if isinstance(case, Draft):
-        draft = _assigned(case.shortened() if shortened else case, map(Assigned, overrides))
-    else:
-        draft = read_draft(case, overrides, shortened)
-    return _assigned(draft, varied).scene()
+    return read_draft(case, overrides, shortened).scene()
 
 
 def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:

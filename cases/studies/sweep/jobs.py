@@ -13,7 +13,7 @@ from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.scene.input.case_files import Assigned
 from catenary.cases.scene.input.faults import UnfitScene, shown, shown_word
 from catenary.cases.scene.keys.keys import meant
-from catenary.cases.scene.load import Draft, load_scene, read_draft
+from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import BACKWARD, turned
 from catenary.cases.studies.sweep.variants import Variant
@@ -292,7 +292,7 @@ def scene_of(draft: Draft, variant: Variant, several: bool) -> Scene:
     """
     _refuse_petsc(variant)
     try:
-        scene = load_scene(draft, varied=_assigned(variant))
+        scene = draft.with_words(_assigned(variant)).scene()
         return turned(scene) if variant.direction == BACKWARD else scene
     except UnfitScene:
         raise
