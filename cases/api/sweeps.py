@@ -248,9 +248,9 @@ def sweep(
     import pandas as pd
 
     n_jobs, given, kept = n_at_once(jobs), folder_of(out), listed(histories, "histories")
-    from catenary.cases.studies.planned_sweep import plan_sweep
     from catenary.cases.studies.sweep.jobs import RunOptions, interrupted
     from catenary.cases.studies.sweep.output import table_of
+    from catenary.cases.studies.sweeps import plan_sweep
 
     if kept and given is None:
         raise InputError("histories are kept in a file: give the folder out, too")

@@ -290,7 +290,8 @@ def _array_script(
     from catenary.cases.run.cluster import array_script
     from catenary.cases.run.needs import total_needs
     from catenary.cases.studies.case_study import make_plan
-    from catenary.cases.studies.sweep.sweep import whole_runs_of
+    from catenary.cases.studies.sweep.jobs import whole_runs_of
+    from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 
     chosen, options = words.split()
     if study:
@@ -299,7 +300,9 @@ def _array_script(
         jobs = make_plan(words.case, chosen, words.shortened).jobs
         verb = ["run", *case_words, "--study"]
     else:
-        jobs = whole_runs_of(words.draft(), varied.read(), out).jobs
+        variants = varied.read()
+        jobs = whole_runs_of(words.draft(), variants).jobs
+        refuse_other_sweep(out, variants, force=False)
         given = (word for text in varied.vary or [] for word in ("--vary", text))
         verb = ["sweep", *case_words, *given]
         verb += [] if varied.named is None else ["--variants", str(varied.named.absolute())]

@@ -77,8 +77,8 @@ def sweep(
     histogram : Also write force_histogram.csv, the share of time in bins of the filtered contact
         force, and a picture of it.
     """
-    from catenary.cases.studies.planned_sweep import PlannedSweep, plan_sweep
     from catenary.cases.studies.sweep.jobs import STATISTICS, check_names, parse_part
+    from catenary.cases.studies.sweeps import PlannedSweep, plan_sweep
     from catenary.sweeps import samples_of
 
     own = None if part is None else parse_part(part)
@@ -206,19 +206,19 @@ def merge(folders: list[Path], out: Out, force: Force = False) -> None:
     folders : Folders of sweeps, at least two, or one with parts.
     out : Folder for the table.
     """
-    from catenary.cases.studies import merged_sweeps
+    from catenary.cases.studies import sweeps
     from catenary.cases.studies.sweep.sweep import RECORD
     from catenary.cases.studies.uncertainty import output
 
-    parts = merged_sweeps.parts_of(folders)
+    parts = sweeps.parts_of(folders)
     if len(parts) < 2:
         raise InputError(f"there is only {folders[0]} to merge: name at least two folders")
     refuse_impossible(out)
     # A sweep that runs there would replace the table when it ends.
     with held(out, alone(), "catenary merge"):
         refuse_table(out, RECORD, force)
-        merged = merged_sweeps.merge(parts)
-        files, found, lacks = merged_sweeps.write(out, merged)
+        merged = sweeps.merge(parts)
+        files, found, lacks = sweeps.write_merged(out, merged)
     if found is not None:
         console.say(output.as_text(found) + "\n")
     if lacks:

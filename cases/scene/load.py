@@ -28,9 +28,9 @@ from catenary.cases.scene.keys.keys import (
     known_keys,
     list_of,
     names_value,
+    place_of,
     schema_faults,
     unknown_key,
-    with_kinds,
 )
 from catenary.cases.scene.scene import Scene
 
@@ -73,13 +73,17 @@ class Draft:
         for key, value, where in values:
             known = known_keys(Scene)
             if not names_value(key, known):
-                near = known_keys(Scene, with_kinds(key, raw, Scene))
+                near = known_keys(Scene, place_of(key.split("."), raw, Scene).location)
                 raise InputError(unknown_key(key, where, near))
             if not is_known(key, known):
                 _refuse_without_entry(raw, key, where)
             assign(raw, key, value, where)
             given.append((key, where))
         return replace(self, raw=raw, given=tuple(given))
+
+    def with_words(self, words: Iterable[Assigned]) -> Draft:
+        """This scene with further values in words, such as those of a command; as ``assigned``."""
+        return self.assigned((*parse_assignment(one.text, one.option), one.where) for one in words)
 
     def shortened(self) -> Draft:
         """Return the draft with the values of its ``[test]`` table."""
@@ -138,39 +142,25 @@ def read_draft(case: str | Path, overrides: Sequence[str] = (), shortened: bool 
     path = find_case(str(case)).absolute()
     draft = Draft(read_toml(path), str(path), path.parent)
     draft = draft.shortened() if shortened else draft
-    return _assigned(draft, map(Assigned, overrides))
+    return draft.with_words(map(Assigned, overrides))
 
 
-def _assigned(draft: Draft, assigned: Iterable[Assigned]) -> Draft:
-    return draft.assigned((*parse_assignment(one.text, one.option), one.where) for one in assigned)
-
-
-def load_scene(
-    case: str | Path | Draft,
-    overrides: Sequence[str] = (),
-    shortened: bool = False,
-    varied: Sequence[Assigned] = (),
-) -> Scene:
+def load_scene(case: str | Path, overrides: Sequence[str] = (), shortened: bool = False) -> Scene:
     """The checked scene of a shipped case's name or a case file. Not collective.
 
     Parameters
     ----------
-    case : name, file or folder, or the draft read from one
+    case : name, file or folder
     overrides : ``key=value`` each, value in TOML; they replace values of the file; ``key=`` removes
         a key
     shortened : apply the case's ``[test]`` table before the overrides
-    varied : further assignments, applied last, with the place where each was written
 
     Raises
     ------
     InputError
         If anything is wrong: a ``SceneError`` with all faults of the scene, or one sentence.
     """
-    if isinstance(case, Draft):
-        draft = _assigned(case.shortened() if shortened else case, map(Assigned, overrides))
-    else:
-        draft = read_draft(case, overrides, shortened)
-    return _assigned(draft, varied).scene()
+    return read_draft(case, overrides, shortened).scene()
 
 
 def scene_from(raw: dict[str, Any], origin: Origin, folder: Path | None = None) -> Scene:

@@ -51,7 +51,8 @@ def turned(scene: Scene) -> Scene:
         if "dropper" in incident:
             _turn_dropper(incident, line)
     if wind := raw.get("wind"):
-        wind["direction_deg"] = 180.0 - wind["direction_deg"]
+        other = 180.0 - wind["direction_deg"]
+        wind["direction_deg"] = other if other <= 360.0 else other - 360.0
         wind["stretches"] = _stretches(wind.get("stretches", []), length)
     for motion in ("vertical", "lateral"):
         _turn_course(raw.get("vehicle", {}).get(motion) or {}, length)

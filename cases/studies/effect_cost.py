@@ -26,7 +26,7 @@ from catenary.cases.run.at_rest import rest_of
 from catenary.cases.scene.checks.effects import RELATIVE_MOTION, needs_relative_motion
 from catenary.cases.scene.input.case_files import Assigned
 from catenary.cases.scene.input.faults import shown_word
-from catenary.cases.scene.load import load_scene
+from catenary.cases.scene.load import load_scene, read_draft
 from catenary.cases.scene.scene import Scene, end_of, problem_of
 from catenary.cases.studies.sweep.jobs import Job, RunOptions, interrupted, statistics_of
 from catenary.cases.studies.sweep.run_jobs import run_jobs
@@ -284,7 +284,8 @@ def _shortened(scene: Scene, stretch: float) -> list[str]:
 
 def _scene(options: CostOptions, further: Sequence[str]) -> Scene:
     varied = [Assigned(text, "--cost", "by plan --cost") for text in further]
-    return load_scene(options.case, options.overrides, options.shortened, varied)
+    draft = read_draft(options.case, options.overrides, options.shortened)
+    return draft.with_words(varied).scene()
 
 
 def _job(name: str, scene: Scene) -> Job:

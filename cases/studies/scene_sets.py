@@ -203,38 +203,22 @@ def members_of(table: SetTable) -> list[Member]:
     }
     speeds: Sequence[float | None] = table.speeds_km_h or [None]
     combined = itertools.product(table.directions, speeds, trains, table.seeds)
-    found = [
-        _member(table, direction, speed, train, seed, tuple(trains[train]))
-        for direction, speed, train, seed in combined
-    ]
-    if len(found) > MOST_SCENES:
-        raise InputError(f"the set has {len(found)} scenes; at most {MOST_SCENES} are allowed")
-    return found
-
-
-def _member(
-    table: SetTable,
-    direction: str,
-    speed: float | None,
-    train: str,
-    seed: int | None,
-    of_train: tuple[tuple[str, Any], ...],
-) -> Member:
-    values = [*of_train]
-    if speed is not None:
-        values.append(("train.speed_km_h", speed))
-    if seed is not None:
-        assert table.errors is not None
-        values.append((f"{_LENGTHS}.standard_deviation_mm", table.errors.dropper_lengths_mm))
-        values.append((f"{_LENGTHS}.seed", seed))
-    for later, _ in values[len(of_train) :]:
-        for earlier, _ in of_train:
+    found = []
+    for direction, speed, train, seed in combined:
+        own: list[tuple[str, Any]] = [] if speed is None else [("train.speed_km_h", speed)]
+        if table.errors is not None and seed is not None:
+            own.append((f"{_LENGTHS}.standard_deviation_mm", table.errors.dropper_lengths_mm))
+            own.append((f"{_LENGTHS}.seed", seed))
+        for (later, _), (earlier, _) in itertools.product(own, trains[train]):
             if sets_again(later, earlier):
                 raise InputError(
                     f"train {train} of the set gives {earlier}, and the set {later}, by which the "
                     "former would be lost; leave one of them out"
                 )
-    return Member(direction, speed, train, seed, tuple(values))
+        found.append(Member(direction, speed, train, seed, (*trains[train], *own)))
+    if len(found) > MOST_SCENES:
+        raise InputError(f"the set has {len(found)} scenes; at most {MOST_SCENES} are allowed")
+    return found
 
 
 @dataclass(frozen=True)

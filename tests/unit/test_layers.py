@@ -192,7 +192,7 @@ TAKEN_BY_BOTH = {
     "catenary.cases.studies.sweep.variants.check_keys",
     "catenary.cases.studies.sweep.variants.product",
     "catenary.cases.run.plan.make_plan",  # submit: two figures, no table
-    "catenary.cases.studies.planned_sweep.plan_sweep",  # checked scenes, of which none is run
+    "catenary.cases.studies.sweeps.plan_sweep",  # checked scenes, of which none is run
     "catenary.cases.studies.records.held_study",  # numerics: studies that the face has not
 }
 

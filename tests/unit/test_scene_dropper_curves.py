@@ -9,6 +9,7 @@ import pytest
 from scenes import Scene, find_case, load_scene, problem_of, recorded
 
 from catenary import InputError
+from catenary.cases.scene.input.csv_files import file_key_of
 
 NO_STIFFNESS = "line.dropper.stiffness_N_per_m="
 POINTS = [[0.0, 0.0], [5e-4, 15.0], [1e-3, 60.0], [3e-3, 400.0]]
@@ -58,7 +59,9 @@ def test_all_tables_of_droppers_take_a_file(tmp_path: Path) -> None:
     number, first = next((i, link) for i, link in links if link.type == "droppers")
     key = f"line.links.{number}"
     words = [f"{key}.stiffness_N_per_m=", f"{key}.axial_stiffness_N=", f"{key}.curve_file={file}"]
-    found = problem_of(load_scene(free, words))
+    of_links = load_scene(free, words)
+    assert file_key_of(f"{key}.curve", of_links.origin) == f"{key}.curve_file"
+    found = problem_of(of_links)
     assert next(g for g in found.line.droppers if g.name == first.name).kind.curve is not None
 
 

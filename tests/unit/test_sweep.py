@@ -22,7 +22,6 @@ from catenary.cases.result_folder import output_folder
 from catenary.cases.result_folder.folder_lock import FolderLock
 from catenary.cases.run.needs import needs_before_meshing
 from catenary.cases.run.runner import run_case
-from catenary.cases.studies.merged_sweeps import merge
 from catenary.cases.studies.records import read_record
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, Job, RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import (
@@ -35,6 +34,7 @@ from catenary.cases.studies.sweep.output import (
 from catenary.cases.studies.sweep.run_jobs import read_summary, run_jobs
 from catenary.cases.studies.sweep.sweep import refuse_other_sweep
 from catenary.cases.studies.sweep.variants import Variant, parse_vary, product
+from catenary.cases.studies.sweeps import merge
 from catenary.postproc.read.results import Results
 from catenary.postproc.report.study_table import write_files
 

@@ -19,10 +19,9 @@ from scenes import read_draft
 import catenary
 from catenary import InputError
 from catenary.cases.scene.load import Draft
-from catenary.cases.studies import merged_sweeps
-from catenary.cases.studies.planned_sweep import plan_sweep
+from catenary.cases.studies import sweeps
 from catenary.cases.studies.records import FOLDER
-from catenary.cases.studies.sweep.histories import KeptHistories
+from catenary.cases.studies.sweep.histories import KeptHistories, merge_histories, piece_file
 from catenary.cases.studies.sweep.jobs import AS_USUAL, HISTORIES, Ended, Part
 from catenary.cases.studies.sweep.output import force_histograms
 from catenary.cases.studies.sweep.together import pieces_of_work
@@ -255,8 +254,8 @@ def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) ->
         part = Part(number, 2)
         _tables_of(draft, variants, out, part, kept)
         folders.append(out / part.folder)
-    merged = merged_sweeps.merge(folders[::-1])
-    written = merged_sweeps.write(tmp_path / "all", merged)
+    merged = sweeps.merge(folders[::-1])
+    written = sweeps.write_merged(tmp_path / "all", merged)
     assert tmp_path / "all" / "histories.h5" in written.files and not written.lacks
     with h5py.File(tmp_path / "all" / "histories.h5") as file:
         assert set(file) == set(whole)
@@ -269,7 +268,7 @@ def test_histories_of_parts_are_merged(scene: catenary.Scene, tmp_path: Path) ->
                 # Scenes stand in lanes of other groups, which round-off tells apart.
                 np.testing.assert_allclose(rows, table, rtol=0.0, atol=1e-4)
     (folders[0] / "histories.h5").unlink()
-    written = merged_sweeps.write(tmp_path / "less", merged_sweeps.merge(folders))
+    written = sweeps.write_merged(tmp_path / "less", sweeps.merge(folders))
     assert written.lacks == f"histories are left out: {folders[0]} has none of {variants[0].name}"
     assert not (tmp_path / "less" / "histories.h5").exists()
 
@@ -282,7 +281,7 @@ def _tables_of(
     kept: tuple[str, ...],
 ) -> dict[str, np.ndarray]:
     """Histories of a sweep, or of a part of it."""
-    sweep = plan_sweep(draft, variants, out, only_statistics=True, histories=kept)
+    sweep = sweeps.plan_sweep(draft, variants, out, only_statistics=True, histories=kept)
     if part is None:
         sweep.run(MPI.COMM_SELF, AS_USUAL, "a test", None)
         folder = out
@@ -296,6 +295,21 @@ def _tables_of(
 def test_histories_of_a_lost_process_are_waited_for(tmp_path: Path) -> None:
     KeptHistories(tmp_path, ["contact_force"], "sweep").join([], {tmp_path / "lost.h5": []})
     assert not list(tmp_path.iterdir())
+
+
+def test_histories_of_a_pantograph_whose_name_has_a_slash_are_merged(tmp_path: Path) -> None:
+    """HDF5 takes what stands before a slash for a group."""
+    variant = Variant("one", (), {"pantographs.a/b.static_force_N": "60"})
+    kept = KeptHistories(tmp_path / "one", ["contact_force"], "sweep")
+    piece = kept.file_of(variant.name)
+    with piece_file(piece, ["contact_force"]) as put:
+        tables = "time", "channels/contact_position", "channels/contact_force"
+        put(0, {name: np.zeros((3,) if name == "time" else (3, 1)) for name in tables})
+    kept.join([variant], {piece: [variant]})
+    files, lacks = merge_histories(tmp_path / "all.h5", {"one": tmp_path / "one"})
+    assert (files, lacks) == ([tmp_path / "all.h5"], "")
+    with h5py.File(tmp_path / "all.h5") as file:
+        assert file["pantographs.a_b.static_force_N"][...].tolist() == [60.0]
 
 
 @pytest.mark.process

@@ -120,6 +120,16 @@ def test_turning_twice_gives_the_scene_that_was() -> None:
         assert again[part] == plain(scene)[part], part
 
 
+@pytest.mark.parametrize("direction", [-360.0, -200.0, -90.0, 30.0, 360.0])
+def test_wind_of_any_direction_blows_across_alike_and_along_against(direction: float) -> None:
+    words = "windy_viaduct", [f"wind.direction_deg={direction}"]
+    wind = turned(load_scene(*words)).wind
+    assert wind is not None and abs(wind.direction_deg) <= 360.0
+    here, there = np.deg2rad([direction, wind.direction_deg])
+    # Angles of some radians are rounded to 1e-15 of them.
+    assert (np.cos(there), np.sin(there)) == pytest.approx((-np.cos(here), np.sin(here)), abs=1e-14)
+
+
 def test_the_run_in_is_as_long_in_both_directions() -> None:
     scene = scene_of("evaluation.from_m=330", "evaluation.to_m=1100")
     other = turned(scene)

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from catenary import InputError
-from catenary.cases.studies import merged_sweeps
+from catenary.cases.studies import sweeps
 from catenary.cases.studies.sweep.jobs import Ended
 from catenary.cases.studies.sweep.output import files_of, table_of
 from catenary.cases.studies.sweep.variants import Variant
@@ -283,7 +283,7 @@ def test_what_is_no_table_of_runs_is_one_sentence(tmp_path: Path) -> None:
 
 
 def merged(*folders: Path) -> dict[str, Any]:
-    record = merged_sweeps.merge(folders).record
+    record = sweeps.merge(folders).record
     return record
 
 
@@ -295,7 +295,7 @@ def test_disjoint_and_common_samples_merge_into_the_table_of_all(tmp_path: Path)
     record = merged(rest, odd)
     assert record["rows"] == json.loads((whole / "sweep.json").read_text())["rows"]
     assert len(record["variants"]) == 30
-    files, found, _ = merged_sweeps.write(tmp_path / "all", merged_sweeps.merge([odd, rest]))
+    files, found, _ = sweeps.write_merged(tmp_path / "all", sweeps.merge([odd, rest]))
     assert found == evaluate(read_run_table(whole))
     assert (tmp_path / "all" / "sweep.csv").read_text() == (whole / "sweep.csv").read_text()
     assert {path.name for path in files} >= {"sweep.csv", "sweep.json", "uncertainty.json"}

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from catenary.base.errors import InputError
-from catenary.cases.scene.input.case_files import read_toml
+from catenary.cases.scene.input.case_files import read_toml, value_at
 from catenary.cases.scene.input.faults import Fault, Origin, shown
 from catenary.cases.scene.input.plain_text import read_text
 from catenary.postproc.standards.rule_books import book_of
@@ -44,24 +44,19 @@ def take_in_files(
     """
     taken, faults = list(origin.taken_in), []
     most: int | None = None  # spans of a file, of which the scene may take the first ones alone
-    for where, table, named, key, read in _places(raw):
-        name = table.get(named) if isinstance(table, dict) else None
-        if not isinstance(name, str) or not name:
-            continue
+    for where, table, named, key, read in _files_of(raw):
+        name = table.pop(named)
         file_key, pairs_key = f"{where}.{named}", f"{where}.{key}"
-        del table[named]
-        own = origin.is_overridden(file_key) or folder is None
-        base = Path.cwd() if own or folder is None else folder
-        path = base / name
+        base = Path.cwd() if folder is None or origin.is_overridden(file_key) else folder
+        path, begin = base / name, f"{file_key} is {_named(name)} {origin.of(file_key)}"
         try:
             if read is _book:
-                _refuse_outside(path, base, f"{file_key} is {_named(name)} {origin.of(file_key)}")
+                _refuse_outside(path, base, begin)
             if key in table:
                 raise InputError(
                     f"{file_key} is {shown(name)} {origin.of(file_key)}; {pairs_key} is given too: "
                     "take one of them away"
                 )
-            begin = f"{file_key} is {_named(name)} {origin.of(file_key)}"
             if read is _patterns:
                 table[key] = _patterns(path, begin, raw, most)
             else:
@@ -86,11 +81,8 @@ def absolute_names(raw: dict[str, Any], folder_of: Callable[[str], Path]) -> Non
     InputError
         If a rule book does not stand there, or is none.
     """
-    for where, table, named, key, read in _places(raw):
-        name = table.get(named) if isinstance(table, dict) else None
-        if not isinstance(name, str) or not name:
-            continue
-        base = folder_of(f"{where}.{named}")
+    for where, table, named, key, read in _files_of(raw):
+        base, name = folder_of(f"{where}.{named}"), table[named]
         if read is _book:
             sentence = f"{where}.{named} is {_named(name)}"
             _refuse_outside(base / name, base, sentence)
@@ -107,42 +99,43 @@ def file_key_of(key: str, origin: Origin) -> str | None:
     """
     if key not in dict(origin.taken_in):
         return None
-    places = ((f"{where}.{own}", f"{where}.{named}") for where, _, named, own, _ in _places({}))
-    return dict(places).get(key)
+    above, _, last = key.rpartition(".")
+    pattern = re.sub(r"\.\d+(?=\.)", ".*", f"{above}.")[:-1]
+    named = (name for where, name, own, _ in _files() if (where, own) == (pattern, last))
+    return f"{above}.{next(named)}"
 
 
 # Reader of a file, called with its path, the begin of a sentence about it, and the raw scene.
 _Read = Callable[[Path, str, dict[str, Any]], Any]
 
 
-def _places(raw: dict[str, Any]) -> Iterator[tuple[str, Any, str, str, _Read]]:
-    """Tables that may name files: their keys, they themselves, the key of the name, the key of the
-    numbers, and what reads the file. Spans come before the droppers in them."""
+def _files() -> Iterator[tuple[str, str, str, _Read]]:
+    """Tables that may name files, the key of the name, the key of the numbers, and what reads the
+    file. Spans come before the droppers in them."""
+    for where in ("vehicle.vertical", "vehicle.lateral"):
+        yield where, "by_time_file", "by_time", _pairs
+        yield where, "by_place_file", "by_place", _pairs
+    yield "evaluation", "rules_file", "own_rules", _book
+    yield "line", "spans_file", "span_m", _spans
+    for where in ("line.dropper", "line.auxiliary_wire.dropper", "line.links.*"):
+        yield where, "curve_file", "curve", _pairs
+        yield where, "patterns_file", "patterns", _patterns
+    yield "irregularities.contact_wire_height", "by_place_file", "by_place", _heights
+    yield "irregularities.running_surface", "by_place_file", "by_place", _heights
+    yield "irregularities.dropper_lengths", "by_dropper_file", "by_dropper", _lengths
 
-    def below(table: Any, name: str) -> Any:
-        return table.get(name) if isinstance(table, dict) else None
 
-    vehicle, line = raw.get("vehicle"), raw.get("line")
-    for direction in ("vertical", "lateral"):
-        for course in ("by_time", "by_place"):
-            where = f"vehicle.{direction}"
-            yield where, below(vehicle, direction), f"{course}_file", course, _pairs
-    yield "evaluation", raw.get("evaluation"), "rules_file", "own_rules", _book
-    yield "line", line, "spans_file", "span_m", _spans
-    links = below(line, "links")
-    hung = [("line.dropper", below(line, "dropper"))]
-    hung += [("line.auxiliary_wire.dropper", below(below(line, "auxiliary_wire"), "dropper"))]
-    links = links if isinstance(links, list) else ()
-    hung += [(f"line.links.{i}", one) for i, one in enumerate(links)]
-    for where, table in hung:
-        yield where, table, "curve_file", "curve", _pairs
-        yield where, table, "patterns_file", "patterns", _patterns
-    irregular = raw.get("irregularities")
-    for name in ("contact_wire_height", "running_surface"):
-        where = f"irregularities.{name}"
-        yield where, below(irregular, name), "by_place_file", "by_place", _heights
-    lengths = below(irregular, "dropper_lengths")
-    yield "irregularities.dropper_lengths", lengths, "by_dropper_file", "by_dropper", _lengths
+def _files_of(raw: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], str, str, _Read]]:
+    """As ``_files``, those that a raw scene names, behind the key of each table the table."""
+    links = value_at(raw, "line.links")
+    n_links = len(links) if isinstance(links, list) else 0
+    for pattern, named, key, read in _files():
+        one_each = range(n_links) if "*" in pattern else (0,)
+        for where in (pattern.replace("*", str(number)) for number in one_each):
+            table = value_at(raw, where)
+            name = table.get(named) if isinstance(table, dict) else None
+            if isinstance(name, str) and name:
+                yield where, table, named, key, read
 
 
 def _refuse_outside(path: Path, base: Path, where: str) -> None:

@@ -7,7 +7,7 @@ import functools
 import types
 import typing
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -96,56 +96,54 @@ def tables_in(annotation: Any) -> tuple[tuple[type[Table], ...], bool]:
     return (), False
 
 
-def with_kinds(key: str, raw: Any, model: type[BaseModel]) -> list[str]:
-    """A dotted key as pydantic's location, with the kinds of tables that ``raw`` says there are."""
+class Place(NamedTuple):
+    """Where a key stands among the tables of a scene.
+
+    Attributes
+    ----------
+    parts : of the dotted key, as far as it leads through what is written
+    location : the same with the kinds of tables on the way, as pydantic has them
+    field : what it names, None of a number, of a name that the scene chose, or of an unknown key
+    kind : of the last table of which there are several kinds, "" if there is none
+    """
+
+    parts: list[str]
+    location: list[str]
+    field: FieldInfo | None
+    kind: str
+
+
+def place_of(key: Sequence[int | str], raw: Any, model: type[BaseModel]) -> Place:
+    """The place of a key, given by its parts or as a location of pydantic, in tables ``raw``."""
+    parts: list[str] = []
     location: list[str] = []
     here: tuple[type[BaseModel], ...] = (model,)
-    named = choosing = False
-    for part in key.split("."):
-        if choosing and not named:
-            choosing = False
-            kind = raw.get("type", kind_of(here[0])) if isinstance(raw, dict) else ""
-            chosen = tuple(table for table in here if kind_of(table) == kind)
-            if chosen:
-                here = chosen
-                location.append(str(kind))
-        location.append(part)
-        raw = raw.get(part) if isinstance(raw, dict) else None
+    field, kind, named = None, "", False  # named: what comes next is a name that the scene chose
+    for part in key:
+        if len(here) > 1 and not named and isinstance(raw, dict):
+            own = raw.get("type", raw.get("kind", kind_of(here[0])))
+            if chosen := tuple(table for table in here if kind_of(table) == own):
+                here, kind = chosen, str(own)
+                location.append(kind)
+                if part == kind:
+                    continue
+        if part == "[key]" or (isinstance(part, int) and not isinstance(raw, list)):
+            break  # one number was written where a list may stand
+        parts.append(str(part))
+        location.append(str(part))
+        if isinstance(raw, list):
+            raw = raw[int(part)] if str(part).isdecimal() and int(part) < len(raw) else None
+        else:
+            raw = raw.get(part) if isinstance(raw, dict) else None
         if named:
             named = False
             continue
-        fields = [table.model_fields[part] for table in here if part in table.model_fields]
-        here, named = tables_in(fields[0].annotation) if fields else ((), False)
-        choosing = len(here) > 1
-    return location
-
-
-def without_kinds(
-    location: Sequence[int | str], model: type[BaseModel]
-) -> tuple[list[int | str], FieldInfo | None]:
-    """A location of pydantic without the kinds of tables in it, and the field where it ends."""
-    parts: list[int | str] = []
-    here: tuple[type[BaseModel], ...] = (model,)
-    field: FieldInfo | None = None
-    named = choosing = False  # what comes next is a name that the scene chose, or a kind
-    for part in location:
-        if choosing and not named:
-            choosing = False
-            chosen = tuple(table for table in here if kind_of(table) == part)
-            if chosen:
-                here = chosen
-                continue
-        parts.append(part)
-        if named:
-            named = False
-            continue
-        field = next(
-            (table.model_fields[str(part)] for table in here if str(part) in table.model_fields),
-            None,
-        )
+        fields = [
+            table.model_fields[parts[-1]] for table in here if parts[-1] in table.model_fields
+        ]
+        field = fields[0] if fields else None
         here, named = tables_in(field.annotation) if field is not None else ((), False)
-        choosing = len(here) > 1
-    return parts, field
+    return Place(parts, location, field, kind)
 
 
 @functools.lru_cache(maxsize=256)
@@ -299,29 +297,24 @@ def schema_faults(
     found.sort(key=lambda p: 0 if p["type"] == "extra_forbidden" else 1)
     faults: list[Fault] = []
     for one in found[:MOST_TOLD]:
-        parts, field = without_kinds(one["loc"], model)
-        key = plain(".".join(_location(parts, raw)), _LONGEST) or "the scene"
-        faults.append(Fault(key, _sentence(dict(one), key, parts, field, model, origin)))
+        place = place_of(one["loc"], raw, model)
+        key = plain(".".join(place.parts), _LONGEST) or "the scene"
+        faults.append(Fault(key, _sentence(dict(one), key, place, model, origin)))
     return faults, max(0, len(found) - MOST_TOLD)
 
 
 def _sentence(
-    fault: dict[str, Any],
-    key: str,
-    parts: list[int | str],
-    field: FieldInfo | None,
-    model: type[BaseModel],
-    origin: Origin,
+    fault: dict[str, Any], key: str, place: Place, model: type[BaseModel], origin: Origin
 ) -> str:
     where = origin.of(key)
     kind = fault["type"]
     if kind == "extra_forbidden":
-        of_this_kind = known_keys(model, fault["loc"])
+        of_this_kind = known_keys(model, place.location)
         if not is_known(key, of_this_kind) and is_known(key, known_keys(model)):
-            return f"{key} {where} does not belong to type {_kind(fault['loc'], parts)}"
+            return f"{key} {where} does not belong to type {place.kind}"
         return unknown_key(key, where, of_this_kind)
     if kind == "missing":
-        meaning = field.description if field is not None else ""
+        meaning = place.field.description if place.field is not None else ""
         return f"{key}{f' ({meaning})' if meaning else ''} is missing {where}"
     wanted = "must be something else"
     if kind in _WANTED:
@@ -351,32 +344,3 @@ def _guess(key: str, value: float) -> str:
         return f"; {guess}" if guess else ""
     unit = unit_of(key)
     return f"; usual are {usual[0]:.12g} to {usual[1]:.12g} {unit}".rstrip()
-
-
-def _kind(loc: Sequence[int | str], parts: Sequence[int | str]) -> str:
-    """The last kind of table in a pydantic location, from what is left without kinds."""
-    left, kind = list(parts), ""
-    for part in loc:
-        if left and part == left[0]:
-            left.pop(0)
-        else:
-            kind = str(part)
-    return kind
-
-
-def _location(loc: Sequence[int | str], raw: Any) -> list[str]:
-    """The part of a pydantic location that exists as written, with the missing or extra key."""
-    parts: list[str] = []
-    for part in loc:
-        if part == "[key]":
-            break
-        if isinstance(part, int) and not isinstance(raw, list):
-            break  # one number was written where a list may stand
-        parts.append(str(part))
-        if isinstance(raw, dict):
-            raw = raw.get(part)
-        elif isinstance(raw, list) and isinstance(part, int) and part < len(raw):
-            raw = raw[part]
-        else:
-            raw = None
-    return parts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from catenary.cases.scene.keys.table import Table, given, not_with, together
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
@@ -18,23 +18,10 @@ _PITCH = ("pitch_inertia_kg_m2", "pitch_spring_distance_m")
 LEAST_MASS, LEAST_INERTIA = 1e-3, 1e-6
 
 
-def _no_less(least: float, unit: str) -> AfterValidator:
-    def check(value: float) -> float:
-        if value < least:
-            raise ValueError(f"must be at least {least:g} {unit}")
-        return value
-
-    return AfterValidator(check)
-
-
 def _no_switch(value: Any) -> Any:
     if isinstance(value, bool):
         raise ValueError("must be 1 or 2")
     return value
-
-
-SomeMass = _no_less(LEAST_MASS, "kg")
-SomeInertia = _no_less(LEAST_INERTIA, "kg m2")
 
 
 class FlexureTable(Table):
@@ -60,15 +47,21 @@ class StripsTable(Table):
     length_m: float | None = Field(
         None, gt=0, le=5, description="of a strip, across the track; unchecked if absent"
     )
-    mass_kg: Annotated[float, Field(gt=0, le=100), SomeMass] | None = Field(
-        None, description="of each strip on springs of its own, part of the head's"
+    mass_kg: float | None = Field(
+        None,
+        ge=LEAST_MASS,
+        le=100,
+        description="of each strip on springs of its own, part of the head's",
     )
     stiffness_N_per_m: float | None = Field(
         None, gt=0, le=1e8, description="between each strip and the head"
     )
     damping_N_s_per_m: float = Field(0.0, ge=0, le=1e6, description="between each strip and head")
-    pitch_inertia_kg_m2: Annotated[float, Field(gt=0, le=1000), SomeInertia] | None = Field(
-        None, description="of a lumped head that pitches between two strips"
+    pitch_inertia_kg_m2: float | None = Field(
+        None,
+        ge=LEAST_INERTIA,
+        le=1000,
+        description="of a lumped head that pitches between two strips",
     )
     pitch_spring_distance_m: float | None = Field(
         None, gt=0, le=3, description="along the track, between the springs below such a head"
@@ -139,8 +132,8 @@ class StripsTable(Table):
 class RollTable(Table):
     """A lumped head that rolls on two springs beside each other."""
 
-    inertia_kg_m2: Annotated[float, Field(gt=0, le=1000), SomeInertia] = Field(
-        description="of the head, about the track"
+    inertia_kg_m2: float = Field(
+        ge=LEAST_INERTIA, le=1000, description="of the head, about the track"
     )
     spring_distance_m: float = Field(
         gt=0, le=3, description="across the track, between the springs below the head"

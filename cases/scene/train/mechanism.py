@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from catenary.cases.scene.keys.table import Table, ascending, ascending_pairs, either, exactly_one
-from catenary.cases.scene.train.head import SomeInertia, SomeMass
+from catenary.cases.scene.train.head import LEAST_INERTIA, LEAST_MASS
 from catenary.mbs.rigid.bodies import SPACE
 
 Coordinate = Annotated[float, Field(ge=-100, le=100)]
@@ -49,9 +49,9 @@ _ORIGIN = [0.0, 0.0, 0.0]
 class BodyTable(Table):
     """A rigid body; its axes are principal axes of inertia through its centre of mass."""
 
-    mass_kg: Annotated[float, Field(gt=0, le=10000), SomeMass] = Field(description="mass")
+    mass_kg: float = Field(ge=LEAST_MASS, le=10000, description="mass")
     inertia_kg_m2: Annotated[
-        list[Annotated[float, Field(gt=0, le=1e6), SomeInertia]], Field(min_length=3, max_length=3)
+        list[Annotated[float, Field(ge=LEAST_INERTIA, le=1e6)]], Field(min_length=3, max_length=3)
     ] = Field(description="moments of inertia about the body's axes")
     position_m: Point = Field(description="centre of mass at the start, joints roughly closed")
     turn: Turn = Field(_ORIGIN, description="Euler parameters e1, e2, e3 at the start")

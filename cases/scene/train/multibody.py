@@ -5,7 +5,7 @@ Only scenes that have one import this, and with it the machinery of multibody sy
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -100,17 +100,18 @@ def _joint(name: str, t: schema.JointTable) -> Joint:
     if isinstance(t, schema.FixedTable):
         e0 = np.sqrt(1.0 - np.dot(t.turn, t.turn))
         return Fixed(name, t.j, t.i, *at, (float(e0), *t.turn))
-    if isinstance(t, schema.SphericalTable):
-        return Spherical(name, t.i, t.j, *at)
-    if isinstance(t, schema.RevoluteTable):
-        return Revolute(name, t.i, t.j, *at, tuple(t.axis_i), tuple(t.axis_j))
-    if isinstance(t, schema.PointOnLineTable):
-        return PointOnLine(name, t.i, t.j, *at, tuple(t.axis_i))
-    if isinstance(t, schema.PrismaticTable):
-        axes = (tuple(v) for v in (t.axis_i, t.axis_j, t.normal_i, t.normal_j))
-        return Prismatic(name, t.i, t.j, *at, *axes)
-    axes = (tuple(v) for v in (t.turn_axis_i, t.turn_axis_j, t.slide_axis_j))
-    return RevolutePrismatic(name, t.i, t.j, *at, *axes)
+    joint, axes = _OF_AXES[t.type]
+    return joint(name, t.i, t.j, *at, *(tuple(getattr(t, axis)) for axis in axes))
+
+
+# Joints of two points, and the keys of the axes that they take.
+_OF_AXES: dict[str, tuple[Callable[..., Joint], tuple[str, ...]]] = {
+    "spherical": (Spherical, ()),
+    "revolute": (Revolute, ("axis_i", "axis_j")),
+    "point_on_line": (PointOnLine, ("axis_i",)),
+    "prismatic": (Prismatic, ("axis_i", "axis_j", "normal_i", "normal_j")),
+    "revolute_prismatic": (RevolutePrismatic, ("turn_axis_i", "turn_axis_j", "slide_axis_j")),
+}
 
 
 def _force(name: str, t: schema.ForceTable) -> Force:

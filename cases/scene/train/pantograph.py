@@ -18,12 +18,12 @@ from pydantic import (
 from catenary.base.errors import InputError
 from catenary.cases.scene.input.case_files import assign, value_at
 from catenary.cases.scene.keys.table import Table, ascending, exactly_one, given, not_with
-from catenary.cases.scene.train.head import RollTable, SomeMass, StripsTable
+from catenary.cases.scene.train.head import LEAST_MASS, RollTable, StripsTable
 from catenary.cases.scene.train.laws import AerodynamicsTable, LawTable, RegulationTable
 from catenary.cases.scene.train.mechanism import BodyTable, ForceTable, JointTable, Name
 from catenary.mbs.lumped import READY
 
-Mass = Annotated[float, Field(gt=0, le=1000), SomeMass]
+Mass = Annotated[float, Field(ge=LEAST_MASS, le=1000)]
 Stiffness = Annotated[float, Field(ge=0, le=1e8)]
 DampingValue = Annotated[float, Field(ge=0, le=1e6)]
 # Names of ready chains, and the lists that stand for one.

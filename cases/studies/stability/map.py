@@ -17,7 +17,8 @@ from matplotlib.lines import Line2D
 
 from catenary.base.errors import InputError
 from catenary.cases.process.workers import WorkerLost
-from catenary.cases.scene.load import Draft, load_scene
+from catenary.cases.scene.input.case_files import Assigned
+from catenary.cases.scene.load import Draft
 from catenary.cases.scene.run.numerics import MAX_DT
 from catenary.cases.scene.scene import Scene, resolved
 from catenary.cases.studies.hard.runs import at_rest
@@ -144,7 +145,7 @@ class StabilityMap:
 
 def linear_scene(draft: Draft) -> Scene:
     """The case as the map takes it: linear. Raises InputError if its pantograph is no chain."""
-    scene = load_scene(draft, _LINEAR)
+    scene = draft.with_words(map(Assigned, _LINEAR)).scene()
     kind = scene.train.pantographs[0].name
     if scene.pantographs[kind].type != "lumped":
         raise InputError(

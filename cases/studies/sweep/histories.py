@@ -141,7 +141,10 @@ class KeptHistories(KeptRows):
             shapes = [shape for piece in pieces for shape in _shapes(piece)]
             n_steps, n = np.max(shapes, axis=0, initial=1).tolist()
             keys = dict.fromkeys(key for one in variants for key in one.varied)
-            varied = {key: _numbers([one.varied.get(key, "") for one in variants]) for key in keys}
+            varied = {  # a slash in the name of a pantograph would make a group
+                key.replace("/", "_"): _numbers([one.varied.get(key, "") for one in variants])
+                for key in keys
+            }
             row_of = {one.name: row for row, one in enumerate(variants)}
             with _written(self._path) as file:
                 _describe(file, list(row_of), varied, self._names, (n_steps, n))

@@ -13,7 +13,7 @@ from catenary.cases.process.interrupts import Interrupted
 from catenary.cases.scene.input.case_files import Assigned
 from catenary.cases.scene.input.faults import UnfitScene, shown, shown_word
 from catenary.cases.scene.keys.keys import meant
-from catenary.cases.scene.load import Draft, load_scene, read_draft
+from catenary.cases.scene.load import Draft, read_draft
 from catenary.cases.scene.scene import Scene
 from catenary.cases.scene.turned import BACKWARD, turned
 from catenary.cases.studies.sweep.variants import Variant
@@ -198,35 +198,54 @@ def _refuse_petsc(variant: Variant) -> None:
             )
 
 
-def jobs_and_refused(
+class WholeRuns(NamedTuple):
+    """Variants of a case, each of which leaves a run in a folder of its own.
+
+    Attributes
+    ----------
+    draft : the case
+    variants : in their order
+    jobs : of those that can be run
+    refused : how the others ended
+    """
+
+    draft: Draft
+    variants: Sequence[Variant]
+    jobs: list[Job]
+    refused: list[Ended]
+
+    @property
+    def first(self) -> Scene:
+        """The scene of the first variant that can be run."""
+        return self.jobs[0].scene
+
+
+def whole_runs_of(
     draft: Draft, variants: Sequence[Variant], full_report: bool = False
-) -> tuple[list[Job], list[Ended]]:
-    """The jobs of the ``variants`` of a case, ``draft``, that can be run, and how the others ended.
+) -> WholeRuns:
+    """Whole runs of the ``variants`` of a case, ``draft``, with ``full_report`` a report of each.
     Not collective.
 
-    With ``full_report`` each run gets a report. A variant breaks alone if its values do not fit
-    together or are implausible.
+    A variant breaks alone if its values do not fit together or are implausible.
 
     Raises
     ------
     InputError
         As ``make_jobs``, if no variant can be run, or if a value of one is out of bounds.
     """
-    jobs: list[Job] = []
-    refused: list[Ended] = []
-    several = len(variants) > 1
+    runs, several = WholeRuns(draft, variants, [], []), len(variants) > 1
     for variant in variants:
         try:
             scene = scene_of(draft, variant, several=several)
-            jobs.append(Job(variant, scene, full_report))
+            runs.jobs.append(Job(variant, scene, full_report))
         except UnfitScene as error:
-            refused.append(Ended(variant, str(error)))
-    if refused and not jobs:
-        first = refused[0]
+            runs.refused.append(Ended(variant, str(error)))
+    if runs.refused and not runs.jobs:
+        first = runs.refused[0]
         raise InputError(
             f"variant {first.variant.name}: {first.outcome}" if several else first.outcome
         )
-    return jobs, refused
+    return runs
 
 
 def in_order(
@@ -255,11 +274,10 @@ def make_jobs(
     InputError
         If a scene is wrong, with the variant's name if there are several.
     """
-    draft = read_draft(case, overrides, shortened)
-    jobs, refused = jobs_and_refused(draft, variants)
-    if refused:
-        raise InputError(f"variant {refused[0].variant.name}: {refused[0].outcome}")
-    return jobs
+    runs = whole_runs_of(read_draft(case, overrides, shortened), variants)
+    for one in runs.refused:
+        raise InputError(f"variant {one.variant.name}: {one.outcome}")
+    return runs.jobs
 
 
 def scene_of(draft: Draft, variant: Variant, several: bool) -> Scene:
@@ -274,7 +292,7 @@ def scene_of(draft: Draft, variant: Variant, several: bool) -> Scene:
     """
     _refuse_petsc(variant)
     try:
-        scene = load_scene(draft, varied=_assigned(variant))
+        scene = draft.with_words(_assigned(variant)).scene()
         return turned(scene) if variant.direction == BACKWARD else scene
     except UnfitScene:
         raise

@@ -15,12 +15,12 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from catenary.cases.scene.input.case_files import REMOVED, parse_assignment
-from catenary.cases.scene.keys.keys import ANY
+from catenary.cases.scene.keys.keys import is_known
 from catenary.cases.scene.keys.units import unit_of, without_unit
 from catenary.cases.studies.sweep.jobs import STATISTICS, Ended, statistics_of
 from catenary.cases.studies.sweep.sweep import RECORD
 from catenary.cases.studies.sweep.variants import Variant, is_number
-from catenary.cases.terminal.lists import Key, keys_of_a_scene
+from catenary.cases.terminal.lists import keys_of_a_scene
 from catenary.cases.terminal.terminal_text import labelled
 from catenary.postproc.evaluate.statistics import HISTOGRAM_BIN
 from catenary.postproc.report.pictures import figures
@@ -218,7 +218,7 @@ def draw_statistics(
 def key_in_words(key: str) -> str:
     """Meaning of a dotted key, with its table and unit: ``contact wire: tension [N]``."""
     parts = [part for part in key.split(".") if not part.isdigit()]
-    known = _known(key)
+    known = next((one for one in keys_of_a_scene() if is_known(key, (one.name,))), None)
     is_short = known is not None and len(known.meaning) <= _LONGEST
     meaning = known.meaning if known is not None and is_short else _spaced(parts[-1])
     tables = [_spaced(part) for part in parts[1 if is_short or len(parts) > 2 else 0 : -1]]
@@ -232,17 +232,6 @@ def value_in_words(key: str, value: Any) -> str:
     name = _spaced(key.rsplit(".", 1)[-1])
     text = str(value).lower() if isinstance(value, bool) else str(value)
     return f"{name} {text} {unit_of(key)}".rstrip()
-
-
-def _known(key: str) -> Key | None:
-    parts = key.split(".")
-    for one in keys_of_a_scene():
-        pattern = one.name.split(".")
-        if len(pattern) == len(parts) and all(
-            want in (ANY, part) for want, part in zip(pattern, parts, strict=True)
-        ):
-            return one
-    return None
 
 
 def _spaced(name: str) -> str:

@@ -1,4 +1,4 @@
-"""A sweep whose variants leave whole runs, and what a folder of one already holds.
+"""The record that a sweep has left in its folder, and in what another sweep differs from it.
 
 Two sweeps are of one scene if the records of both have its tables.
 """
@@ -8,7 +8,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
+
+from pydantic import BaseModel
 
 from catenary.base.errors import InputError
 from catenary.base.files import is_file
@@ -19,22 +21,29 @@ from catenary.cases.result_folder.output_folder import (
 )
 from catenary.cases.scene.input.faults import shown
 from catenary.cases.scene.load import Draft
-from catenary.cases.studies.sweep.jobs import (
-    Ended,
-    Job,
-    RunOptions,
-    in_order,
-    jobs_and_refused,
-)
 from catenary.cases.studies.sweep.variants import Variant
-
-if TYPE_CHECKING:
-    from catenary.cases.scene.scene import Scene
-    from catenary.cases.studies.sweep.jobs import Part
 
 RECORD = "sweep.json"
 # Tables that no figure of a variant depends on.
 _IDLE = ("case", "output", "test")
+
+
+class RecordedVariant(BaseModel):
+    """A variant, as the record of a sweep has it."""
+
+    name: str
+    assignments: Any
+
+
+class Record(BaseModel):
+    """Record of a sweep, as far as it is read."""
+
+    case: str
+    varied: list[str]
+    wall_s: float
+    variants: list[RecordedVariant]
+    rows: list[dict[str, Any]]
+    scene: dict[str, Any] | None = None
 
 
 def other_value(
@@ -72,63 +81,6 @@ def differences(one: Any, two: Any, key: str = "") -> Iterator[tuple[str, Any, A
         yield from differences(a, b, f"{key}.{name}" if key else name)
 
 
-class WholeRuns(NamedTuple):
-    """Variants of a case, each of which leaves a run in a folder of its own.
-
-    Attributes
-    ----------
-    draft : the case
-    variants : in their order
-    jobs : of those that can be run
-    refused : how the others ended
-    """
-
-    draft: Draft
-    variants: Sequence[Variant]
-    jobs: list[Job]
-    refused: list[Ended]
-
-    @property
-    def first(self) -> Scene:
-        """The scene of the first variant that can be run."""
-        return self.jobs[0].scene
-
-    def run(
-        self, out: Path, comm: Any, options: RunOptions, part: Part | None = None
-    ) -> list[Ended]:
-        """Run what is not done yet; returns how all variants ended, in their order. Collective.
-
-        With a ``part`` only its variants are run and returned, without the refused ones.
-        """
-        from catenary.cases.studies.sweep.run_jobs import run_jobs
-
-        if part is not None:
-            return run_jobs(part.of(self.jobs), out, comm, options)
-        return in_order(self.variants, run_jobs(self.jobs, out, comm, options), self.refused)
-
-
-def whole_runs_of(
-    draft: Draft,
-    variants: Sequence[Variant],
-    out: Path,
-    *,
-    full_report: bool = False,
-    force: bool = False,
-) -> WholeRuns:
-    """A sweep of ``variants`` of a case, ``draft``, into a folder ``out`` where they leave whole
-    runs, with ``full_report`` a report of each. Not collective.
-
-    Raises
-    ------
-    InputError
-        As ``jobs_and_refused``, or if the folder has the table of a sweep with variants that this
-        one has not, and ``force`` is not given.
-    """
-    runs = WholeRuns(draft, variants, *jobs_and_refused(draft, variants, full_report))
-    refuse_other_sweep(out, variants, force)
-    return runs
-
-
 def refuse_other_sweep(
     out: Path, variants: Sequence[Variant], force: bool, draft: Draft | None = None
 ) -> None:
@@ -142,11 +94,10 @@ def refuse_other_sweep(
     if force or not is_file(path):
         return
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-        there = {str(one["name"]): list(one["assignments"]) for one in table["variants"]}
-        scene, varied = table.get("scene") or {}, [str(key) for key in table["varied"]]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        record = Record.model_validate_json(path.read_bytes())
+    except (OSError, ValueError):
         return
+    there = {one.name: one.assignments for one in record.variants}
     here = {variant.name: list(variant.assignments) for variant in variants}
     replace = f"{another_folder()}, or give {force_option()} to replace it"
     if other := sorted(there.keys() - here.keys()):
@@ -155,10 +106,10 @@ def refuse_other_sweep(
         )
     if other := sorted(name for name, values in there.items() if values != here[name]):
         raise InputError(f"{path} is the table of a sweep with another {other[0]}; {replace}")
-    if draft is None or not scene:
+    if draft is None or not record.scene:
         return
     own = json.loads(json.dumps(draft.table(), default=str))
-    if (differs := other_value(scene, own, varied)) is not None:
+    if (differs := other_value(record.scene, own, record.varied)) is not None:
         key, value, wanted = differs
         raise InputError(
             f"{path} is the table of a sweep with {key} = {shown(value)}, here it is "

@@ -29,7 +29,7 @@ ASSIGNMENTS = {
         "must be of type fixed, revolute, spherical",
     ),
     "joint without type": ([f"{KIND}.joints.guide.type="], "must have a type"),
-    "weightless body": ([f"{KIND}.bodies.mast.mass_kg=0"], "greater than 0 [kg]"),
+    "weightless body": ([f"{KIND}.bodies.mast.mass_kg=0"], "at least 0.001 [kg]"),
     "negative inertia": (
         [f"{KIND}.bodies.mast.inertia_kg_m2=[1, -1, 1]"],
         f"{KIND}.bodies.mast.inertia_kg_m2.1 is -1",
@@ -237,11 +237,11 @@ ASSIGNMENTS = {
     ),
     "hardly a mass": (
         [f"{KIND}.bodies.mast.mass_kg=1e-300"],
-        "is 1e-300 on the command line (--set); it must be at least 0.001 kg",
+        "is 1e-300 on the command line (--set); it must be at least 0.001 [kg]",
     ),
     "hardly an inertia": (
         [f"{KIND}.bodies.mast.inertia_kg_m2=[1, 1e-300, 1]"],
-        "inertia_kg_m2.1 is 1e-300 on the command line (--set); it must be at least 1e-06 kg m2",
+        "inertia_kg_m2.1 is 1e-300 on the command line (--set); it must be at least 1e-06 [kg m2]",
     ),
     "switch for a number of strips": (
         [f"{KIND}.strips.number=true"],

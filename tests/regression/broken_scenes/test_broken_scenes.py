@@ -237,7 +237,7 @@ ASSIGNMENTS = {
         "2 entries",
     ),
     "masses without springs": (["pantographs.reference.masses_kg=[7, 9, 6]"], "one value per mass"),
-    "weightless head": (["pantographs.reference.masses_kg=[0, 15]"], "greater than 0 [kg]"),
+    "weightless head": (["pantographs.reference.masses_kg=[0, 15]"], "at least 0.001 [kg]"),
     "loose head": (["pantographs.reference.stiffnesses_N_per_m=[0, 50]"], "only the last"),
     "negative damper": (["pantographs.reference.dampings_N_s_per_m=[-1, 90]"], "at least 0"),
     "two static forces": (
