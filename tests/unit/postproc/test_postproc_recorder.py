@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
-import os
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -165,39 +163,6 @@ def test_a_folder_that_cannot_be_made_breaks_the_run_with_a_sentence(
         watcher.start(march.stage())
 
 
-MARCHING = f"""
-import runpy, sys
-from pathlib import Path
-names = runpy.run_path({str(CONFTEST)!r})
-march = names["March"](n_steps=10**6)
-watcher = names["Recorder"](march.comm, Path(sys.argv[1]), march.header(), flush_every=20)
-watcher.start(march.stage())
-for step in range(10**6):
-    watcher.observe(march.view(step))
-    if step == 200:
-        print("marching", flush=True)
-"""
-
-
-@pytest.mark.process
-def test_a_killed_run_is_readable_up_to_its_last_flush(tmp_path: Path, make_march: Any) -> None:
-    path = tmp_path / "run.h5"
-    with subprocess.Popen(
-        [sys.executable, "-c", MARCHING, str(path)], stdout=subprocess.PIPE, text=True
-    ) as program:
-        assert program.stdout is not None
-        assert program.stdout.readline() == "marching\n"
-        os.kill(program.pid, signal.SIGKILL)
-    assert program.returncode == -signal.SIGKILL
-    with Results(path) as results:
-        assert results.outcome == "running" and not results.complete
-        assert results.n_steps >= 199 and (results.n_steps + 1) % 20 == 0
-        assert_true_to_march(results, make_march())
-        state = results.checkpoint
-        assert 179 <= state["step"] <= results.n_steps
-        assert (state["state"] == state["step"]).all()
-
-
 def test_rows_that_a_kill_left_unwritten_are_not_read(tmp_path: Path, make_march: Any) -> None:
     # HDF5 may have told that the tables got longer before it wrote what is in them.
     march, path = make_march(n_steps=300), tmp_path / "run.h5"
@@ -223,13 +188,17 @@ def test_rows_that_a_kill_left_unwritten_are_not_read(tmp_path: Path, make_march
         np.testing.assert_allclose(results.energies()["time"], 0.01 * np.arange(31))
 
 
-FULL_DISK = MARCHING.replace(
-    "watcher.start",
-    """
-import resource
+FULL_DISK = f"""
+import resource, runpy, sys
+from pathlib import Path
+names = runpy.run_path({str(CONFTEST)!r})
+march = names["March"](n_steps=10**6)
+watcher = names["Recorder"](march.comm, Path(sys.argv[1]), march.header(), flush_every=20)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
-watcher.start""",
-)
+watcher.start(march.stage())
+for step in range(10**6):
+    watcher.observe(march.view(step))
+"""
 
 
 @pytest.mark.process
