@@ -129,8 +129,7 @@ test-readers: setup-tests ## what other programs read of a run: versions of VTK 
 # first are the one that replaces malloc, and the one whose exceptions it watches. A fault ends the tests,
 # with a report that pytest must not hold back.
 SANITIZED := $(CURDIR)/build/sanitized
-SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_station_passes.py test_varying_stations.py \
-    test_repeated_blocks.py test_inner_problem.py test_end_memory.py) \
+SANITIZED_TESTS ?= $(addprefix tests/unit/solver/,test_stations.py test_inner_problem.py test_end_memory.py) \
     $(addprefix tests/unit/mbs/,test_native_heads.py test_multibody_flat.py) \
     tests/verification/test_partly_slack_droppers.py \
     tests/verification/test_tangents.py::test_tangents_side_by_side_are_those_of_each_alone \

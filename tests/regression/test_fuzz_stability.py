@@ -11,7 +11,7 @@ import os
 from typing import NamedTuple
 
 import pytest
-from fuzzing_stability import extreme_scene
+from fuzzing import extreme_scene
 from scenes import with_words
 
 import catenary

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fuzzing import N_STEPS, RandomScene, wide_scene
-from fuzzing_contact import law_variants
+from fuzzing_parts import law_variants
 from program import assert_sound
 from scenes import load_scene
 from verb_runner import invoke

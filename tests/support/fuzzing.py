@@ -5,12 +5,14 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
-from fuzzing_broken import INCIDENTS, a_way
+from fuzzing_line import as_assignments
 from fuzzing_nonsense import nonsense
 from fuzzing_parts import SLACK_DAMPINGS, mechanism, put_more
 from fuzzing_planes import put_planes
 from fuzzing_topologies import put_as_one, put_topology
-from fuzzing_words import as_assignments
+
+# --- random scenes from a seed --------------------------------------------------------------------
+
 
 BASE = "en50318_2002"
 N_STEPS = 200
@@ -159,95 +161,38 @@ def _positions(rng: random.Random, span: float, count: int) -> list[float]:
     return places
 
 
-_NUMBERS = (
-    "line.contact_wire.tension_N",
-    "line.contact_wire.mass_kg_per_m",
-    "line.messenger_wire.tension_N",
-    "line.dropper.stiffness_N_per_m",
-    "line.support.stiffness_N_per_m",
-    "line.encumbrance_m",
-    "train.speed_km_h",
-    "contact.stiffness_N_per_m",
-    "numerics.dt_s",
-    "line.n_spans",
-    "mesh.elements_per_gap",
-    "numerics.newmark_beta",
-)
-_NO_NUMBERS = ("-1", "0", "nan", "inf", "-inf", "'20 kN'", "[]", "true", "{}", "1e400", "-5e-324")
-_LETTERS = "abcdefghijklmnopqrstuvwxyz_0123456789"
-
-
-def broken_scene(seed: int) -> RandomScene:
-    """A sound scene with one thing in it that is not."""
-    rng = random.Random(~seed)
-    sound = sound_scene(seed)
-    given = dict(word.split("=", 1) for word in sound.assignments)
-    start, length = (
-        float(given["train.start_m"]),
-        (float(given["line.span_m"]) * int(given["line.n_spans"])),
-    )
-    ways = (
-        lambda: f"{rng.choice(_NUMBERS)}={rng.choice(_NO_NUMBERS)}",
-        lambda: f"{_misspelt(rng, rng.choice(list(given)))}=1.0",
-        lambda: f"train.start_m={rng.uniform(1.01, 9.0) * length!r}",
-        lambda: f"train.end_m={rng.uniform(0.0, 0.99) * start!r}",
-        lambda: f"train.end_m={rng.uniform(1.01, 3.0) * length!r}",
-        lambda: f"evaluation.to_m={rng.uniform(1.01, 3.0) * length!r}",
-        lambda: f"evaluation.from_m={rng.uniform(1.01, 3.0) * length!r}",
-        lambda: f"line.dropper.positions_m=[{rng.uniform(71.0, 400.0)!r}]",
-        lambda: "line.dropper.positions_m=[5.0, 4.0]",
-        lambda: f"numerics.dt_s={rng.uniform(0.0251, 10.0)!r}",
-        lambda: f"train.pantographs=[{{name='{_word(rng)}'}}]",
-        lambda: f"train.pantographs=[{{name='reference',behind_m={rng.uniform(0.1, 9.0)!r}}}]",
-        lambda: "pantographs.reference.masses_kg=[1.0,-2.0]",
-        lambda: "pantographs.reference.masses_kg=[1.0,2.0,3.0,4.0]",
-        lambda: f"effects.{_word(rng)}=true",
-        lambda: "effects={gravity=false,dropper_slackening=true}",
-        lambda: f"numerics.scheme='{_word(rng)}'",
-        lambda: f"contact.law='{_word(rng)}'",
-        lambda: "numerics.newmark_gamma=0.4",
-        lambda: "numerics.newmark_gamma=0.9",
-        lambda: f"line.dropper.residual_stiffness_ratio={rng.uniform(1.0, 5.0)!r}",
-        lambda: f"mesh.file='{_word(rng)}.msh'",
-        lambda: f"train.speed_km_h.{_word(rng)}=3",
-        lambda: f"{_word(rng)}",
-        lambda: f"line.encumbrance_m={rng.uniform(1e-3, 5e-3)!r}",
-    )
-    word = rng.choice(ways)()
-    return RandomScene(seed, (*sound.assignments, word), word)
-
-
-def broken_happening(seed: int) -> RandomScene:
-    """A sound scene with incidents, in which one of these or of the numerics cannot be."""
-    rng = random.Random(f"happening {seed}")
-    sound = sound_scene(seed)
-    given = dict(word.split("=", 1) for word in sound.assignments)
-    dt = float(given["numerics.dt_s"])
-    incidents = INCIDENTS.format(rng.uniform(0.0, 9.0) * dt, 20 * dt, rng.randint(0, 99) * dt)
-    way = a_way(rng, N_STEPS, dt, given["train.pantographs"])
-    kept = (
-        "effects.contact_loss=true",
-        "effects.dropper_slackening=true",
-        "train.start_below_m=0.0",
-        incidents,
-    )
-    words = (*sound.assignments, *kept, *way.assignments)
-    return RandomScene(seed, words, " ".join(way.assignments), names=way.key)
-
-
 def broken_topology(seed: int) -> RandomScene:
-    """A scene of any topology with nonsense in one of all keys, or with parts that contradict."""
-    made = topology_scene(seed)
-    given = dict(word.split("=", 1) for word in made.assignments)
-    way = nonsense(random.Random(f"nonsense {seed}"), given)
-    words = (*made.assignments, *way.assignments)
-    return RandomScene(seed, words, " ".join(way.assignments), names=way.names)
+    """A scene of any topology with nonsense in one of all keys."""
+    way = nonsense(random.Random(f"nonsense {seed}"))
+    words = (*topology_scene(seed).assignments, way.assignment)
+    return RandomScene(seed, words, way.assignment, names=way.names)
 
 
-def _word(rng: random.Random) -> str:
-    return "x" + "".join(rng.choice(_LETTERS) for _ in range(rng.randint(3, 12)))
+# --- random scenes at the bounds of what the schema lets pass -------------------------------------
 
 
-def _misspelt(rng: random.Random, key: str) -> str:
-    place = rng.randrange(1, len(key))
-    return f"{key[:place]}{rng.choice(_LETTERS)}q{key[place:]}"
+# Steps of a run; a quarter of the step takes four times as many.
+STEPS_AT_BOUNDS = 300
+
+
+def extreme_scene(seed: int) -> RandomScene:
+    """A scene with some of its keys at, or near, what is allowed; it may be refused."""
+    rng = random.Random(f"extreme {seed}")
+    made = rng.choice((sound_scene, sound_scene, topology_scene))(seed, STEPS_AT_BOUNDS)
+    more = {
+        "effects.contact_loss": "true",
+        "effects.dropper_slackening": "true",
+        "train.start_below_m": "0.0",
+        "line.dropper.stiffness_N_per_m": f"{10 ** rng.uniform(4.0, 9.0)!r}",
+        "contact.stiffness_N_per_m": f"{10 ** rng.uniform(4.0, 8.0)!r}",
+    }
+    if rng.random() < 0.6:
+        more |= {"line.damping.alpha_s": "0.0", "line.damping.beta_per_s": "0.0"}
+    if rng.random() < 0.4:
+        more["wind"] = f"{{speed_m_per_s={rng.uniform(5.0, 60.0)!r},height_m=6.0}}"
+        more |= {f"line.{wire}.diameter_mm": "13.0" for wire in ("contact_wire", "messenger_wire")}
+        if rng.random() < 0.5:
+            more |= {"effects.lateral_motion": "true", "line.stagger_m": "0.2"}
+            more["line.steady_arm.length_m"] = f"{rng.uniform(0.5, 1.5)!r}"
+    words = (f"{key}={value}" for key, value in more.items())
+    return RandomScene(seed, (*made.assignments, *words), base=made.base)

@@ -1,20 +1,260 @@
-"""Random lines of all topologies in three dimensions: what lets their wires move in all planes,
-what holds them there, how they end, and the wind over them.
-
-Each function puts its keys into the words of a scene that is valid, and mostly leaves it valid:
-parts that do not go together are refused in a sentence.
-"""
+"""Random lines of all topologies in three dimensions, free ones, and their details."""
 
 from __future__ import annotations
 
 import random
+import re
+from itertools import accumulate, pairwise
 
-from fuzzing_details import put_details
-from fuzzing_free import masts, put_free
+from fuzzing_line import strands
+
+# --- what wires and links of a free line may have besides the usual -------------------------------
+
 
 Words = dict[str, object]
+_NOW_AND_THEN = 0.3
+
+
+def put_free(rng: random.Random, words: Words) -> None:
+    """Now and then each of the parts below, where a free line has the wire or links for it."""
+    wires = _numbers(words, "line.wires")
+    links = _numbers(words, "line.links")
+    for part in (_feeder, _stitch, _droppers, _hardware):
+        if rng.random() < _NOW_AND_THEN:
+            part(rng, words, wires, links)
+
+
+def masts(words: Words) -> list[float]:
+    """Places of all masts [m] of a line without transition spans."""
+    span, n = words["line.span_m"], int(str(words["line.n_spans"]))
+    lengths = span if isinstance(span, list) else [float(str(span))]
+    return [0.0, *accumulate(lengths[i % len(lengths)] for i in range(n))]
+
+
+def _numbers(words: Words, key: str) -> dict[str, str]:
+    """Keys of the tables in a list by their names."""
+    names = re.findall(r"(?<![a-z_])name='(\w+)'", str(words[key]))
+    return {name: f"{key}.{i}" for i, name in enumerate(names)}
+
+
+def _feeder(rng: random.Random, words: Words, wires: dict[str, str], links: dict[str, str]) -> None:
+    """A feeder beside the line, on a course of its own, or over some spans only."""
+    if "feeder" not in wires:
+        return
+    key, places = wires["feeder"], masts(words)
+    height = float(re.findall(r"height_m=([\d.]+)", str(words["line.wires"]))[-1])
+    kind = rng.choice(("beside", "course", "stretch"))
+    if kind == "beside":
+        words[f"{key}.stagger_m"] = rng.uniform(-0.3, 0.3)
+        words[f"{key}.sideways_m"] = rng.uniform(-3.0, 3.0)
+    elif kind == "course":
+        words[f"{key}.height_m"] = ""
+        words[f"{key}.course_m"] = [[x, rng.uniform(-1.0, 1.0), height] for x in places]
+    else:
+        words[f"{key}.stretches_m"] = [[places[0], places[-2] if len(places) > 2 else places[-1]]]
+    if rng.random() < 0.5:
+        words[f"{links['feeder_supports']}.supports"] = list(range(1, len(places) - 1))
+
+
+def _stitch(rng: random.Random, words: Words, wires: dict[str, str], links: dict[str, str]) -> None:
+    if "stitch" in wires:
+        words[f"{wires['stitch']}.clamp_stiffness_N_per_m"] = 10 ** rng.uniform(4.0, 8.0)
+        words[f"{wires['stitch']}.supports"] = [1]
+
+
+def _droppers(
+    rng: random.Random, words: Words, wires: dict[str, str], links: dict[str, str]
+) -> None:
+    """Droppers in some of the spans, or by their places along the line."""
+    key, places = links["droppers"], masts(words)
+    strands(random.Random(str(words["line.links"])), words, key)
+    _, patterns, listed = str(words["line.links"]).partition("patterns=[")
+    if patterns:
+        count = listed.partition("positions_m=[")[2].partition("]")[0].count(",") + 1
+        sags = [rng.uniform(0.0, 5.0) for _ in range(count)]
+        words[f"{key}.patterns.0.pre_sag_mm"] = words[f"{key}.patterns.1.pre_sag_mm"] = sags
+        return
+    if rng.random() < 0.5:
+        words[f"{key}.spans"] = list(range(1, len(places)))
+        return
+    words[f"{key}.positions_m"], words[f"{key}.count"], words[f"{key}.spacing_m"] = "", "", ""
+    words[f"{key}.pre_sag_mid_mm"] = ""
+    at = [a + share * (b - a) for a, b in pairwise(places) for share in (0.2, 0.5, 0.8)]
+    words[f"{key}.at_m"] = at
+    if rng.random() < 0.5:
+        words[f"{key}.pre_sag_mm"] = [rng.uniform(0.0, 5.0) for _ in at]
+
+
+def _hardware(
+    rng: random.Random, words: Words, wires: dict[str, str], links: dict[str, str]
+) -> None:
+    """Supports as high as a wire needs them; arms at some of the supports."""
+    inner = list(range(1, int(str(words["line.n_spans"]))))
+    if rng.random() < 0.5:
+        words[f"{links['supports']}.holds"] = "'messenger_wire'"
+    if inner:
+        words[f"{links['steady_arms']}.supports"] = inner
+
+
+# --- what random scenes of any topology have now and then besides their planes --------------------
+
+
+_RARELY = 0.2
+_SPECTRA_OF_TRACKS = ("'fra_4'", "'fra_5'", "'fra_6'", "'german_low'", "'german_high'")
+# Irregular heights by place: distance of the places and the most of a height [m].
+_COURSES = (("contact_wire_height", 10.0, 0.01), ("running_surface", 0.5, 2e-4))
+# Effects that a scene may leave out whatever it has.
+_LEFT_OUT = (
+    "arm_inertia", "arm_stiffness", "clamp_mass", "dropper_mass", "structural_damping", "gusts",
+    "wind", "uplift_stops", "fittings", "contact_wire_height", "dropper_lengths", "missing_dropper",
+    "running_surface", "loose_clamp", "worn_wire", "wrong_tension", "hard_spot", "kink", "pre_sag",
+    "tensioners", "temperature", "transition_spans", "absorbing_layers", "periodic_ends",
+    "pantograph_laws", "flexible_strips", "raked_strips", "regulated_lift", "vehicle_suspension",
+    "pantograph_aerodynamics",
+)  # fmt: skip
+
+
+def put_details(rng: random.Random, words: Words) -> None:
+    """Now and then each of the parts below."""
+    for part in (_profiles, _cuts, _carriage, _clamps, _air_behind, _bogies, _sags):
+        if rng.random() < _RARELY:
+            part(rng, words)
+    if rng.random() < _RARELY:
+        words[f"effects.{rng.choice(_LEFT_OUT)}"] = "false"
+
+
+def _profiles(rng: random.Random, words: Words) -> None:
+    """Irregular heights by place, in place of random ones."""
+    length = masts(words)[-1]
+    name, step, most = rng.choice(
+        (("contact_wire_height", 10.0, 0.01), ("running_surface", 0.5, 2e-4))
+    )
+    if any(key.startswith(f"irregularities.{name}") for key in words):
+        return
+    begin = rng.uniform(0.0, 0.5) * length
+    places = [begin + i * step for i in range(8) if begin + i * step < length]
+    pairs = [[x, rng.uniform(-most, most)] for x in places]
+    if len(pairs) >= 4:
+        pairs[0][1] = pairs[-1][1] = 0.0
+        words[f"irregularities.{name}.by_place"] = pairs
+
+
+def _cuts(rng: random.Random, words: Words) -> None:
+    """Single errors of droppers' lengths, and where random ones are cut off."""
+    key = "irregularities.dropper_lengths"
+    if f"{key}.seed" in words:
+        words[f"{key}.cut_off"] = rng.uniform(0.5, 4.0)
+    elif words.get("line.dropper") != "":
+        words[f"{key}.by_dropper"] = [[1, 1, rng.uniform(-20.0, 20.0)]]
+
+
+def _carriage(rng: random.Random, words: Words) -> None:
+    """What else a pantograph may have."""
+    table = "pantographs.reference"
+    words[f"{table}.nominal_height_m"] = rng.uniform(4.8, 5.4)
+    if rng.random() < 0.5:
+        words[f"{table}.static_force_N"] = ""
+        words[f"{table}.static_force_by_speed"] = [[5.0, 60.0], [400.0, rng.uniform(60.0, 250.0)]]
+    if f"{table}.strips.flexure.modes" in words:
+        words[f"{table}.strips.flexure.damping_ratio"] = rng.uniform(0.0, 0.1)
+    strips = f"{table}.strips"
+    if f"{strips}.length_m" in words and f"{strips}.pitch_inertia_kg_m2" not in words:
+        words[f"{strips}.rake_deg"] = rng.uniform(-20.0, 20.0)
+        words["effects.raked_strips"] = rng.choice(["true", "false"])
+    if f"{table}.regulation.measures" in words:
+        words[f"{table}.regulation.from_s"] = rng.uniform(0.0, 0.5)
+    if rng.random() < 0.5:
+        at, most = rng.uniform(0.0, 0.05), rng.uniform(10.0, 1e4)
+        words[f"{table}.laws"] = (
+            f"[{{type='limiter',force_by_rise=[[{at!r},0.0],[{at + 0.1!r},{most!r}]]}},"
+            f"{{type='damper',force_by_velocity=[[-1.0,{-rng.uniform(0, 300)!r}],[0.0,0.0],"
+            f"[1.0,{rng.uniform(0, 300)!r}]]}},"
+            f"{{type='friction',force_N=5.0,velocity_m_per_s={10 ** rng.uniform(-4, -1)!r}}}]"
+        )
+
+
+def _clamps(rng: random.Random, words: Words) -> None:
+    """Stiffness and mass of clamps of further wires, fittings of a length."""
+    for name in ("stitch_wire", "bridle"):
+        if words.get(f"line.{name}"):
+            words[f"line.{name}.clamp_stiffness_N_per_m"] = 10 ** rng.uniform(4.0, 8.0)
+            words[f"line.{name}.clamp_kg"] = rng.uniform(0.0, 0.5)
+    if words.get("line.auxiliary_wire"):
+        for key, most in (("auxiliary_clamp_kg", 0.3), ("messenger_clamp_kg", 0.3),
+                          ("mass_kg_per_m", 0.2)):  # fmt: skip
+            words[f"line.auxiliary_wire.dropper.{key}"] = rng.uniform(0.0, most)
+    if "line.fittings" in words:
+        words["line.fittings.0.length_m"] = rng.uniform(0.0, 3.0)
+        if rng.random() < 0.3 and words.get("line.messenger_wire") != "":
+            words["line.fittings.0.wire"] = "'messenger_wire'"
+
+
+def _sags(rng: random.Random, words: Words) -> None:
+    """Pre-sags by dropper, and what else hangs an auxiliary wire."""
+    places = words.get("line.dropper.positions_m")
+    patterns = str(words.get("line.dropper.patterns", ""))
+    if isinstance(places, list):
+        words["line.dropper.pre_sag_mm"] = [rng.uniform(0.0, 8.0) for _ in places]
+    elif patterns:
+        count = patterns.partition("positions_m=[")[2].partition("]")[0].count(",") + 1
+        sags = [rng.uniform(0.0, 8.0) for _ in range(count)]
+        words["line.dropper.patterns"] = patterns.replace("}", f",pre_sag_mm={sags!r}}}")
+    hung = "line.auxiliary_wire.dropper"
+    if not words.get("line.auxiliary_wire"):
+        return
+    if rng.random() < 0.5:
+        strands(rng, words, hung)
+    if "patterns" in str(words["line.auxiliary_wire"]):
+        words[f"{hung}.patterns.0.pre_sag_mm"] = [0.0] * (
+            str(words["line.auxiliary_wire"])
+            .partition("positions_m=[")[2]
+            .partition("]")[0]
+            .count(",")
+            + 1
+        )
+    elif not isinstance(words["line.span_m"], list) and rng.random() < 0.5:
+        count = rng.randint(1, 5)
+        words[f"{hung}.positions_m"] = ""
+        words[f"{hung}.count"] = count
+        words[f"{hung}.spacing_m"] = float(str(words["line.span_m"])) / (count + 1.0)
+
+
+def _air_behind(rng: random.Random, words: Words) -> None:
+    """A pantograph that runs the other way round has an uplift of its own."""
+    table = "pantographs.reference.aerodynamics"
+    if f"{table}.head_share" not in words:
+        return
+    words[f"{table}.reversed.head_share"] = rng.uniform(0.0, 1.0)
+    if rng.random() < 0.5:
+        words[f"{table}.reversed.uplift_polynomial"] = [0.0, 0.0, rng.uniform(0.0, 2e-3)]
+    else:
+        words[f"{table}.reversed.uplift_by_speed"] = [[50.0, 2.0], [300.0, rng.uniform(9, 90)]]
+    words["train.pantographs.0.reversed"] = "true"
+
+
+def _bogies(rng: random.Random, words: Words) -> None:
+    """A track of any spectrum; a car body that also sways, if there is one."""
+    if "vehicle.irregularity.spectrum" in words:
+        words["vehicle.irregularity.spectrum"] = rng.choice(_SPECTRA_OF_TRACKS)
+        shortest = float(str(words["vehicle.irregularity.shortest_m"]))
+        words["vehicle.irregularity.longest_m"] = shortest * rng.uniform(1.5, 20.0)
+    table = "vehicle.suspension"
+    if f"{table}.body_mass_kg" not in words:
+        return
+    mass = float(str(words[f"{table}.body_mass_kg"]))
+    words[f"{table}.lateral.roll_inertia_kg_m2"] = mass * rng.uniform(0.5, 2.0)
+    words[f"{table}.lateral.stiffness_N_per_m"] = 10 ** rng.uniform(4.5, 6.0)
+    words[f"{table}.lateral.damping_N_s_per_m"] = 10 ** rng.uniform(3.0, 5.0)
+    words[f"{table}.lateral.spring_distance_m"] = rng.uniform(1.5, 2.5)
+    words[f"{table}.lateral.centre_above_m"] = rng.uniform(0.0, 1.0)
+    words[f"{table}.lateral.roof_above_m"] = rng.uniform(0.5, 3.0)
+
+
+# --- random lines of all topologies in three dimensions -------------------------------------------
+
+
 # Shares of the scenes.
-_LATERAL, _ALONG, _NOW_AND_THEN = 0.35, 0.15, 0.2
+_LATERAL, _ALONG = 0.35, 0.15
 # Tables of wires that are whole tables in one word, which takes further keys after it.
 _WHOLE_TABLES = ("stitch_wire", "auxiliary_wire", "bridle")
 
@@ -25,19 +265,19 @@ def put_planes(rng: random.Random, words: Words, topology: str) -> None:
         put_free(rng, words)
     if rng.random() < _LATERAL:
         _lateral(rng, words, topology)
-    if rng.random() < _NOW_AND_THEN:
+    if rng.random() < _RARELY:
         _sway(rng, words)
-    if rng.random() < _NOW_AND_THEN:
+    if rng.random() < _RARELY:
         _ends(rng, words)
-    if "overlap" not in topology and rng.random() < 0.5 * _NOW_AND_THEN:
+    if "overlap" not in topology and rng.random() < 0.5 * _RARELY:
         _transition(rng, words)
     if rng.random() < _ALONG:
         _along(rng, words, topology)
     if "wind.speed_m_per_s" in words:
         _more_wind(rng, words)
-    if rng.random() < _NOW_AND_THEN:
+    if rng.random() < _RARELY:
         _window(rng, words)
-    if rng.random() < 0.5 * _NOW_AND_THEN:
+    if rng.random() < 0.5 * _RARELY:
         _adaptive(rng, words)
     put_details(rng, words)
 

@@ -1,21 +1,33 @@
-"""The environment: five packages of the system and no others, in the versions that were tested."""
+"""The environment, the version, recipes of packagers, and Matplotlib's own cache."""
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import json
+import logging
 import os
 import re
 import subprocess
 import sys
 import sysconfig
 import tomllib
+from collections.abc import Iterator
+from datetime import date
+from importlib import metadata
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+from verb_runner import invoke
+
+from catenary.cases.process import libraries
+
+# --- the environment ------------------------------------------------------------------------------
+
 
 ROOT = Path(__file__).parents[2]
 SITE = Path(sysconfig.get_path("purelib"))
@@ -142,3 +154,131 @@ exit 3
     begun = r"setup: installing things \(some 3 s\) \.\.\.\n"
     said = rf"{begun}{so_far}setup:   \d s\nsetup: checking them \.\.\.\n"
     assert re.fullmatch(said, done.stderr), done.stderr
+
+
+# --- the version stands in pyproject.toml; what else states it agrees -----------------------------
+
+
+VERSION = PROJECT["version"]
+HEADING = re.compile(r"^## (?!Unreleased)(\S+) - (\d{4}-\d\d-\d\d)$", re.MULTILINE)
+
+
+def citation() -> dict[str, str]:
+    """Entries of CITATION.cff that stand on one line."""
+    text = (ROOT / "CITATION.cff").read_text()
+    return dict(re.findall(r"^([\w-]+): (.+)$", text, re.MULTILINE))
+
+
+def test_the_installed_program_tells_it() -> None:
+    assert metadata.version("catenary") == VERSION, "run make setup"
+    assert invoke("--version").stdout.splitlines()[0] == f"catenary {VERSION}"
+
+
+def test_the_changelog_begins_with_unreleased_changes_and_then_has_it() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text()
+    headings = re.findall(r"^## (.+)$", text, re.MULTILINE)
+    assert headings[0] == "Unreleased"
+    released = HEADING.findall(text)
+    assert len(released) == len(headings) - 1
+    assert released[0][0] == VERSION
+    days = [date.fromisoformat(day) for _, day in released]
+    assert days == sorted(days, reverse=True)
+
+
+def test_the_citation_has_it_with_its_day() -> None:
+    released = dict(HEADING.findall((ROOT / "CHANGELOG.md").read_text()))
+    assert citation()["version"] == VERSION
+    assert citation()["date-released"] == released[VERSION]
+
+
+# --- recipes for other package managers, against the project's own declarations -------------------
+
+
+RECIPES = ROOT / "docs" / "packaging"
+# Names of the package index that conda-forge and Spack spell in another way.
+OF_CONDA = {"matplotlib": "matplotlib-base", "gmsh": "python-gmsh"}
+OF_SPACK = {"gmsh": "gmsh"}
+
+
+def wanted() -> dict[str, str]:
+    """Bounds of the versions of each package that the project needs."""
+    pairs = (re.fullmatch(r"([\w-]+)(.*)", one) for one in PROJECT["dependencies"])
+    return {pair[1]: pair[2] for pair in pairs if pair}
+
+
+def test_the_recipe_of_conda_has_the_same_dependencies() -> None:
+    recipe = yaml.safe_load((RECIPES / "recipe.yaml").read_text(encoding="utf-8"))
+    needs = dict(one.split(" ", 1) for one in recipe["requirements"]["run"])
+    assert needs.pop("python") == PROJECT["requires-python"]
+    assert needs == {OF_CONDA.get(name, name): bounds for name, bounds in wanted().items()}
+
+
+def test_the_package_of_spack_has_the_same_dependencies() -> None:
+    tree = ast.parse((RECIPES / "package.py").read_text(encoding="utf-8"))
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    specs = [
+        str(ast.literal_eval(call.args[0])).split(" ")[0]
+        for call in calls
+        if ast.unparse(call.func) == "depends_on"
+    ]
+    needs = {name: bounds for name, _, bounds in (spec.partition("@") for spec in specs)}
+    for name, bounds in wanted().items():
+        found = needs[OF_SPACK.get(name, f"py-{name}")]
+        least, below = re.fullmatch(r">=([\d.]+),<([\d.]+)", bounds).groups()
+        first, _, last = found.partition(":")
+        assert first == least, name
+        # The last version in a range of Spack stands for all that begin with it.
+        *upper, end = (int(part) for part in below.split("."))
+        assert last == ".".join(map(str, (*upper, end - 1))), name
+
+
+def test_all_name_one_version() -> None:
+    version = PROJECT["version"]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    recipe = yaml.safe_load((RECIPES / "recipe.yaml").read_text(encoding="utf-8"))
+    module = (RECIPES / "catenary.lua").read_text(encoding="utf-8")
+    assert citation["version"] == recipe["context"]["version"] == version
+    assert set(re.findall(r"\d+\.\d+\.\d+", module)) == {version}
+
+
+# --- matplotlib's own cache -----------------------------------------------------------------------
+
+
+@pytest.fixture(autouse=True)
+def no_choice(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv(libraries.CACHE_VARIABLE, "")  # so that it is put back at the end
+    monkeypatch.delenv(libraries.CACHE_VARIABLE)
+    level = logging.getLogger("matplotlib").level
+    yield
+    logging.getLogger("matplotlib").setLevel(level)
+
+
+def test_a_home_that_can_be_written_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "not" / "yet"))
+    libraries.choose_matplotlib_folder()
+    assert libraries.CACHE_VARIABLE not in os.environ
+
+
+@pytest.mark.parametrize("home", ["file", "x" * 300])  # a name too long cannot be looked up
+def test_without_a_home_it_is_in_a_folder_of_the_program(
+    home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / home))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "kept"))
+    libraries.choose_matplotlib_folder()
+    assert os.environ[libraries.CACHE_VARIABLE] == str(
+        tmp_path / "kept" / "catenary" / "matplotlib"
+    )
+
+
+def test_without_any_folder_it_is_silent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(libraries.tempfile, "gettempdir", lambda: str(tmp_path / "file"))
+    libraries.choose_matplotlib_folder()
+    assert libraries.CACHE_VARIABLE not in os.environ
+    assert not logging.getLogger("matplotlib").isEnabledFor(logging.WARNING)

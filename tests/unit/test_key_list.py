@@ -1,16 +1,25 @@
-"""``catenary list --keys FILTER``: bounds, words, defaults and typical values of keys."""
+"""Keys of scenes: ``catenary list --keys FILTER``, the JSON schema, what random scenes draw."""
 
 from __future__ import annotations
 
+import json
 import re
+import tomllib
+from pathlib import Path
+from typing import Any
 
+import jsonschema
 import pytest
-from scenes import load_scene
+from fuzzing import topology_scene, wide_scene
+from scenes import Scene, load_scene
 from verb_runner import invoke
 
 from catenary import InputError
+from catenary.cases.scene.keys.keys import known_keys
 from catenary.cases.scene.keys.units import USUAL
-from catenary.cases.terminal.lists import key_details, key_table, keys_of_a_scene
+from catenary.cases.terminal.lists import key_details, key_table, keys_of_a_scene, scene_schema
+
+# --- ``catenary list --keys FILTER`` --------------------------------------------------------------
 
 
 def first_words(text: str) -> list[str]:
@@ -55,7 +64,10 @@ def test_a_filter_is_a_part_or_a_pattern(wanted: str, keys: list[str]) -> None:
             "requires effects.wind acts only with a table [wind.gusts] in a wind above 0 source:",
         ),
         ("line.steady_arm.holds_height", "default false; true or false"),
-        ("pantographs.*.masses_kg", "list of 1 to 20, each number from 0.001 to 1000; only of lumped"),
+        (
+            "pantographs.*.masses_kg",
+            "list of 1 to 20, each number from 0.001 to 1000; only of lumped",
+        ),
         ("petsc.march_pc_asm_type", "one of basic, restrict, interpolate, none"),
         ("train.end_m", "may be left out; number"),
     ],
@@ -114,3 +126,132 @@ def test_all_keys_are_one_line_each() -> None:
     lines = key_table().splitlines()
     assert len(lines) == len(keys_of_a_scene())
     assert invoke("list", "--keys").stdout.splitlines() == lines
+
+
+# --- the JSON schema of ``case.toml`` -------------------------------------------------------------
+
+
+ROOT = Path(__file__).parents[2]
+SCENES = sorted([*ROOT.glob("cases/*/case.toml"), *ROOT.glob("docs/examples/*.toml")])
+SCHEMA = scene_schema()
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+
+
+def faults(scene: dict[str, Any]) -> list[str]:
+    """What the schema finds wrong, each fault with its place."""
+    return [f"{error.json_path}: {error.message[:200]}" for error in VALIDATOR.iter_errors(scene)]
+
+
+def simple() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "cases/en50318_2002/case.toml").read_text(encoding="utf-8"))
+
+
+def test_the_schema_is_one() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.parent.name + "/" + file.stem)
+def test_a_shipped_scene_fits(file: Path) -> None:
+    assert faults(tomllib.loads(file.read_text(encoding="utf-8"))) == []
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value", "place"),
+    [
+        ("line", "spam_m", 50.0, "$.line"),
+        ("line", "n_spans", "22", "$.line.n_spans"),
+        ("line", "span_m", -1.0, "$.line.span_m"),
+        ("numerics", "integrator", "euler", "$.numerics.integrator"),
+        ("effects", "lateral_motoin", True, "$.effects"),
+        ("line", "topology", "stiched", "$.line.topology"),
+        ("evaluation", "system", "ac_25_kV", "$.evaluation.system"),
+        ("evaluation", "edition", True, "$.evaluation.edition"),
+    ],
+)
+def test_a_slip_does_not_fit(table: str, key: str, value: Any, place: str) -> None:
+    scene = simple()
+    scene.setdefault(table, {})[key] = value
+    (fault,) = faults(scene)
+    assert fault.startswith(f"{place}:")
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value"),
+    [("evaluation", "edition", 2012), ("evaluation", "edition", "2012"), ("line", "span_m", [60])],
+)
+def test_what_may_be_written_in_two_ways_fits(table: str, key: str, value: Any) -> None:
+    scene = simple()
+    scene[table][key] = value
+    assert faults(scene) == []
+
+
+def test_a_pantograph_needs_its_lists_or_a_model() -> None:
+    scene = simple()
+    del scene["pantographs"]["reference"]["masses_kg"]
+    assert faults(scene)
+
+
+def test_the_schema_has_every_key_with_its_unit() -> None:
+    tables = [SCHEMA, *SCHEMA["$defs"].values()]
+    there = {key: spec for table in tables for key, spec in table.get("properties", {}).items()}
+    lasts = {key.rpartition(".")[2] for key in known_keys(Scene)} - {"*"}
+    assert lasts <= set(there) | set(SCHEMA["properties"]["effects"]["properties"])
+    assert there["speed_km_h"]["description"].endswith("[km/h]")
+
+
+def test_list_prints_it() -> None:
+    told = invoke("list", "--schema")
+    assert json.loads(told.output) == SCHEMA
+    both = invoke("list", "--schema", "--keys")
+    assert both.exit_code == 2 and "--keys and --schema" in both.output
+
+
+# --- random scenes draw every key that scenes may have; what they leave to other tests is ---------
+
+
+MOST_SEEDS = 4000
+# Left to tests of their own: texts, files, mechanisms as data, options of PETSc, what is written.
+ELSEWHERE = re.compile(
+    r"case\b|test\b|petsc\b|output\b|evaluation\.(edition|system|rules|own_rules|limits)\b|mesh\.file|.*_file$|.*\.patterns\.\*\.spans$"
+    r"|pantographs\.\*\.(type|head|arm|actuator|calibrate|working_height_m|assembly_tolerance_m"
+    r"|gravity|as_published|bodies|joints|forces|corrections)\b"
+    r"|numerics\.(eps_\w+|max_iterations)|effects\.(vertical|gravity|several_pantographs)"
+)
+
+
+def draw(found: set[str], seed: int) -> None:
+    """Add the keys of the scenes of a seed, entries of lists as ``*``."""
+    for made in (topology_scene(seed), wide_scene(seed)):
+        for assignment in made.assignments:
+            key, value = assignment.split("=", 1)
+            if value:
+                put(found, key, tomllib.loads(f"x={value}")["x"])
+
+
+def put(found: set[str], key: str, value: object) -> None:
+    parts = ["*" if part.isdigit() else part for part in key.split(".")]
+    found |= {".".join(parts[:n]) for n in range(1, len(parts) + 1)}
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            put(found, f"{key}.{name}", inner)
+    elif isinstance(value, list):
+        for inner in value:
+            if isinstance(inner, dict):
+                put(found, f"{key}.0", inner)
+
+
+def test_every_key_of_a_scene_is_drawn_or_left_to_a_test_of_its_own() -> None:
+    found: set[str] = set()
+    missing = [key for key in known_keys(Scene) if not ELSEWHERE.match(key)]
+    for seed in range(MOST_SEEDS):
+        draw(found, seed)
+        if seed % 200 == 199:
+            missing = [key for key in missing if not is_in(found, key)]
+        if not missing:
+            return
+    raise AssertionError(", ".join(missing))
+
+
+def is_in(found: set[str], key: str) -> bool:
+    pattern = re.compile(re.escape(key).replace(r"\*", r"[^.]+"))
+    return any(pattern.fullmatch(one) for one in found)

@@ -40,6 +40,7 @@ from catenary.cases.studies.tolerance.study import make_plan
 SAG = [0.0, 10.0, 20.0, 30.0, 35.0, 30.0, 20.0, 10.0, 0.0]
 FORWARD = {"directions": ["forward"]}
 HEAD = "pantographs.reference.masses_kg"
+FIRST_MASS = [{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}]
 
 
 def draft(**more: Any) -> Draft:
@@ -95,6 +96,12 @@ def task_of(**tables: Any) -> OptimiseTask:
     return read_task(usual | tables, OptimiseTask)
 
 
+def optimum(**tables: Any) -> study.Optimum:
+    """What the task of these tables finds of the draft."""
+    (found,) = study.optimise(study.make_plan(draft(), task_of(**tables)))
+    return found
+
+
 # --- searches ------------------------------------------------------------------------------------
 
 
@@ -107,8 +114,7 @@ def test_a_search_finds_the_bottom_of_a_bowl(method: str, evaluated: Any) -> Non
         return summary(20.0 + (first - 8.0) ** 2 + (second - 14.0) ** 2)
 
     evaluated(bowl)
-    task = task_of(set=FORWARD, search={"methods": [method], "precision": 3e-3})
-    (found,) = study.optimise(study.make_plan(draft(), task))
+    found = optimum(set=FORWARD, search={"methods": [method], "precision": 3e-3})
     # Searches end with a gain below 3e-3 of 22 N: within sqrt(0.066) = 0.26 kg of the bottom.
     # Forward differences of 0.2 kg put the bottom of a parabola 0.1 kg off.
     assert found.values[HEAD] == pytest.approx([8.0, 14.0], abs=0.36)
@@ -160,13 +166,12 @@ def test_constraints_are_kept(method: str, evaluated: Any) -> None:
         return summary(20.0 + (first - 12.0) ** 2, min_N=50.0 - 5.0 * first)
 
     evaluated(slope)
-    task = task_of(
+    found = optimum(
         set=FORWARD,
-        variables=[{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}],
+        variables=FIRST_MASS,
         constraints=[{"statistic": "min_N", "at_least": 5.0}],
         search={"methods": [method], "precision": 1e-2},
     )
-    (found,) = study.optimise(study.make_plan(draft(), task))
     assert not found.found.violation
     # A gain of 1e-2 of 29 N at a slope of 6 N/kg is 0.05 kg; generations end a little earlier.
     assert found.values[HEAD][0] == pytest.approx(9.0, abs=0.15)
@@ -179,9 +184,7 @@ def test_a_search_goes_round_what_breaks(evaluated: Any) -> None:
         return {BROKE: "it broke"} if first > 9.0 else summary(20.0 + (first - 12.0) ** 2)
 
     evaluated(brittle)
-    variables = [{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}]
-    task = task_of(set=FORWARD, variables=variables)
-    (found,) = study.optimise(study.make_plan(draft(), task))
+    found = optimum(set=FORWARD, variables=FIRST_MASS)
     assert 7.2 < found.values[HEAD][0] <= 9.0
     assert any(point.broke for point in found.history)
 
@@ -234,14 +237,13 @@ def test_constraints_that_nothing_keeps_are_named(evaluated: Any) -> None:
 
 
 def remarks_of(tables: dict[str, Any]) -> list[str]:
-    (found,) = study.optimise(study.make_plan(draft(), task_of(**tables)))
-    return found.remarks
+    return optimum(**tables).remarks
 
 
 def test_whole_units_are_kept_where_they_are_allowed(evaluated: Any) -> None:
     evaluated(lambda scene: summary(20.0 + (masses(scene)[0] - 8.8) ** 2))
     variables = [{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0], "round_to": 0.5}]
-    (found,) = study.optimise(study.make_plan(draft(), task_of(variables=variables)))
+    found = optimum(variables=variables)
     assert found.values[HEAD][0] == pytest.approx(7.2 + 1.5)
 
 
@@ -260,7 +262,7 @@ def test_whole_units_stay_within_what_is_allowed(evaluated: Any) -> None:
             "constraints": [{"statistic": "min_N", "at_least": 0.0}],
             "variables": [{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0], "round_to": unit}],
         }
-        (found,) = study.optimise(study.make_plan(draft(), task_of(**tables)))
+        found = optimum(**tables)
         assert found.values[HEAD][0] == pytest.approx(expected, abs=1e-3)
         assert found.is_rounded is (unit < 3.0)
         assert any("round_to is not kept" in text for text in found.remarks) is not found.is_rounded
@@ -448,12 +450,11 @@ def test_constraints_that_contradict_each_other_are_refused(
 
 def test_directions_of_a_symmetric_line_are_one_run_in_its_middle(evaluated: Any) -> None:
     """Another evaluated stretch has another run-in from the other end: both ways are run."""
-    variables = [{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}]
     middle = 0.5 * float(np.sum(span_lengths(draft().scene().line)))
     for behind, n_runs in ((60.0, 1), (0.0, 2)):
         own = draft(**{"evaluation.from_m": middle - 60.0, "evaluation.to_m": middle + behind})
         evaluated(lambda scene: summary(20.0))
-        task = task_of(variables=variables, search={"most_runs": 1})
+        task = task_of(variables=FIRST_MASS, search={"most_runs": 1})
         (found,) = study.optimise(study.make_plan(own, task))
         assert found.n_runs == n_runs
 
@@ -574,13 +575,12 @@ def test_what_is_shipped_bounds_what_gets_worse(of: str, by: float, evaluated: A
         return found
 
     evaluated(formula)
-    task = task_of(
+    found = optimum(
         set={"directions": ["forward"], "speeds_km_h": [200.0, 250.0]},
-        variables=[{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}],
+        variables=FIRST_MASS,
         objective={"speeds_km_h": [250.0]},
         constraints=[{"statistic": "std_N", "at_most": 1.1, "of_shipped": of}],
     )
-    (found,) = study.optimise(study.make_plan(draft(), task))
     assert found.values[HEAD][0] == pytest.approx(7.2 + by, abs=1e-3)
     assert found.found.value == pytest.approx(30.0 - by, abs=1e-3)
     with pytest.raises(InputError, match=r"set.speeds_km_h, which has no 230"):
@@ -596,12 +596,11 @@ def test_a_share_of_what_is_negative_is_worse_by_as_much(shipped: float, evaluat
         return summary(30.0 - d, min_N=shipped - d)
 
     evaluated(formula)
-    task = task_of(
+    found = optimum(
         set=FORWARD,
-        variables=[{"key": HEAD, "entries": [[1]], "change": [-5.0, 5.0]}],
+        variables=FIRST_MASS,
         constraints=[{"statistic": "min_N", "at_least": 0.9, "of_shipped": "each"}],
     )
-    (found,) = study.optimise(study.make_plan(draft(), task))
     assert found.values[HEAD][0] == pytest.approx(7.2 + 2.0, abs=1e-3)
 
 

@@ -6,7 +6,6 @@ import csv
 import io
 import signal
 from pathlib import Path
-from typing import Any
 
 import pytest
 from measuring import COMM
@@ -15,8 +14,6 @@ from scenes import TINY_WORDS
 from verb_runner import invoke
 from work_items import die_at_275, measure_steps
 
-import catenary
-from catenary import InputError
 from catenary.cases.run.needs import Kept, total_size
 from catenary.cases.studies.sweep.jobs import RunOptions, make_jobs
 from catenary.cases.studies.sweep.output import table_of
@@ -164,9 +161,3 @@ def test_a_program_of_a_user_needs_no_guard_of_its_main_part(tmp_path: Path) -> 
     assert done.code == 0, done.stderr
     one, two = done.stdout.splitlines()
     assert one == two and one.count(",") == 1
-
-
-@pytest.mark.parametrize("jobs", [-1, 1.5, "2"])
-def test_a_number_of_runs_that_is_none_is_refused(jobs: Any) -> None:
-    with pytest.raises(InputError, match="jobs is .*; it is a number of processes"):
-        catenary.sweep(CASE, {"train.speed_km_h": [250]}, jobs=jobs)

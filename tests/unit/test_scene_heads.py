@@ -1,4 +1,4 @@
-"""Strips, roll and vehicle in a scene: converted to SI, refused in one sentence."""
+"""Strips, roll, vehicle, laws and moving bodies in a scene: converted to SI, or refused."""
 
 from __future__ import annotations
 
@@ -7,15 +7,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import Scene, load_scene, problem_of, recorded, resolved, scene_from
+from scenes import Scene, load_scene, problem_of, recorded, resolved, scene_from, with_words
 
-from catenary import InputError
+import catenary
+from catenary import InputError, RunBroken
+from catenary.cases.run.description import kind_lines
+from catenary.cases.scene.checks.mesh_size import estimate_march
 from catenary.cases.scene.checks.scene import MIN_SEPARATION
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.scene import end_of
+from catenary.mbs.build import has_joints
+from catenary.mbs.head.laws import Law, Regulation
+from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.head.strips import Flexure, Strips, Suspension, Turning
-from catenary.mbs.mechanism.multibody_pantograph import MultibodyData
+from catenary.mbs.lumped import LumpedData
+from catenary.mbs.mechanism.full_pantograph import FullPantograph
+from catenary.mbs.mechanism.multibody_pantograph import AllBodies, MultibodyData, reduced
+from catenary.mbs.mechanism.reduction import RaisingPantograph
+from catenary.mbs.rigid.joints import Constant, PrescribedPoint
 from catenary.mbs.vehicle import Harmonic, Irregularity, Spline, VehicleMotion
+from catenary.solver.effects import all_effects as effects
+
+# --- strips, roll and vehicle in a scene ----------------------------------------------------------
+
 
 CASE = "ac_simple"
 KIND = "pantographs.three_masses"
@@ -132,7 +146,6 @@ def test_a_run_ends_before_the_foremost_strip_leaves_the_line() -> None:
 @pytest.mark.parametrize(
     ("overrides", "sentence"),
     [
-        ([f"{KIND}.strips.number=3"], "must be 1 or 2"),
         ([f"{KIND}.strips.number=2"], "needs spacing_m for number = 2"),
         ([f"{KIND}.strips.spacing_m=0.5"], "must not have spacing_m with number = 1"),
         ([f"{KIND}.strips.mass_kg=1"], "mass_kg and stiffness_N_per_m together"),
@@ -150,22 +163,15 @@ def test_a_run_ends_before_the_foremost_strip_leaves_the_line() -> None:
             "strips.length_m is 0.39 m on the command line (--set); at 110 m the wire is 0.2 m "
             "beside the strips' middle (line.stagger_m), so that they must be at least 0.4 m long",
         ),
-        ([ROLL[0]], "roll on the command line (--set) acts only with effects.head_roll = true"),
         ([ROLL[1]], "it acts only with a head that can roll (pantographs.*.roll)"),
         (ROLL, f"it needs {KIND}.strips.length_m"),
-        ([FRA], "vehicle on the command line (--set) acts only with effects.vehicle_motion"),
         ([MOVES], "it acts only with a table [vehicle]; give that, or leave the effect out"),
-        (["vehicle.irregularity.spectrum=fra_1", MOVES], "it must be fra_4, fra_5, fra_6"),
         ([FRA, "vehicle.irregularity.shortest_m=200", MOVES], "must have waves"),
         ([FRA, "numerics.dt_s=6e-3", MOVES], "a wave must take 8 of these"),
         (["vehicle.vertical.amplitude_m=0.1", MOVES], "amplitude_m and frequency_hz together"),
         (["vehicle.vertical.phase_deg=10", MOVES], "must not have phase_deg without amplitude_m"),
         (["vehicle.vertical={}", MOVES], "needs by_time, by_place"),
         (["vehicle={}", MOVES], "needs vertical, lateral or irregularity"),
-        (
-            ["vehicle.vertical.by_time=[[0, 0], [1, 0], [1, 0], [90, 0]]", MOVES],
-            "ascending order, but 1 follows 1",
-        ),
         (
             ["vehicle.vertical.by_time=[[0, 0], [1, 0], [2, 0], [3, 0]]", MOVES],
             "holds from 0 to 3 s, but the run needs it from 0 to 13.68 s",
@@ -178,7 +184,6 @@ def test_a_run_ends_before_the_foremost_strip_leaves_the_line() -> None:
             ["vehicle.vertical.by_place=[[0, 0], [300, 20], [400, 0], [2000, 0]]", MOVES],
             "must stay within 1 m, but is 20 m at 300",
         ),
-        (["vehicle.vertical.by_time_file=no.csv", MOVES], "cannot be read: no such file"),
         (
             ["vehicle.lateral.amplitude_m=0.1", "vehicle.lateral.frequency_hz=1", MOVES],
             "acts only with effects.head_roll = true",
@@ -212,24 +217,6 @@ def test_strips_of_neighbours_must_not_overlap() -> None:
     assert "train.pantographs.1.behind_m is 1.5 m" in str(refused.value)
     two["train"]["pantographs"][1]["behind_m"] = MIN_SEPARATION + 0.56
     assert len(problem_of(scene_from(two, Origin("here", recorded=True))).train.placements) == 2
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("", "it holds no pairs of numbers"),
-        ("x, y\na, b\n", "its line 2 must hold two numbers"),
-        ("0, 0\n1, 0.1, 7\n", "its line 2 must hold two numbers .*, each with a decimal point"),
-        ("0, 0\n1; 0.1\n", "its line 2 must hold two numbers"),
-        ("0, 0\n1, nan\n2, 0\n3, 0\n", "finite"),
-        ("\x00", "it holds no pairs"),
-    ],
-)
-def test_files_that_are_no_course_are_refused(tmp_path: Path, text: str, sentence: str) -> None:
-    file = tmp_path / "course.csv"
-    file.write_text(text)
-    with pytest.raises(InputError, match=sentence):
-        load(f"vehicle.vertical.by_time_file={file}", MOVES)
 
 
 def test_a_multibody_head_s_pitch_is_its_bodies_business() -> None:
@@ -286,3 +273,237 @@ def test_strips_that_cannot_bend_so_are_refused(words: list[str], said: str) -> 
     with pytest.raises(InputError) as refused:
         load(*BENDS, *words)
     assert said in str(refused.value)
+
+
+# --- laws and regulated lifts in a scene ----------------------------------------------------------
+
+
+REFERENCE_CASE, REF = "en50318_2002", "pantographs.reference"
+PI = "measures='contact_force',target=125,gains=[{at=0,error=0.1,integral_per_s=1.0}]"
+LAWS = {
+    "{type='limiter',rise_m=0.1,stiffness_N_per_m=2e4}": Law(
+        1, 2, False, (-1.0, 0.1, 1.1), (0.0, 0.0, 2e4), of_roof=True
+    ),
+    "{type='limiter',at_mass=1,force_by_rise=[[0.0,0.0],[0.1,50.0]]}": Law(
+        0, 2, False, (-1.0, 0.0, 0.1), (0.0, 0.0, 50.0), of_roof=True
+    ),
+    "{type='damper',up_N_s_per_m=200,down_N_s_per_m=30}": Law(
+        1, 2, True, (-1.0, 0.0, 1.0), (-30.0, 0.0, 200.0)
+    ),
+    "{type='damper',at_mass=1,force_by_velocity=[[-1.0,-5.0],[0.0,0.0],[2.0,9.0]]}": Law(
+        0, 1, True, (-1.0, 0.0, 2.0), (-5.0, 0.0, 9.0)
+    ),
+    "{type='spring',at_mass=1,force_by_extension=[[-0.05,-400.0],[0.0,0.0]]}": Law(
+        0, 1, False, (-0.05, 0.0), (-400.0, 0.0)
+    ),
+    "{type='friction',force_N=3}": Law(
+        1, 2, True, (-2e-3, -1e-3, 1e-3, 2e-3), (-3.0, -3.0, 3.0, 3.0)
+    ),
+}
+
+
+def with_laws(*overrides: str) -> Scene:
+    return load_scene(REFERENCE_CASE, overrides)
+
+
+@pytest.mark.parametrize("text", LAWS)
+def test_a_law_is_a_table_of_force(text: str) -> None:
+    (place,) = problem_of(with_laws(f"{REF}.laws=[{text}]")).train.placements
+    assert place.data.laws == (LAWS[text],)
+
+
+def test_a_mechanism_has_head_and_arm() -> None:
+    words = "pantographs.seven_body.laws=[{type='damper',up_N_s_per_m=9,down_N_s_per_m=1}]"
+    (place,) = problem_of(load_scene("ambrosio2012", [words])).train.placements
+    assert place.data.laws == (Law(1, 2, True, (-1.0, 0.0, 1.0), (-1.0, 0.0, 9.0)),)
+
+
+def test_a_regulation_is_data() -> None:
+    scene = with_laws(f"{REF}.regulation={{{PI},filter_s=0.2,delay_s=0.02,from_s=0.5,most_N=30}}")
+    (place,) = problem_of(scene).train.placements
+    assert place.regulator == Regulation(
+        False, 125.0, ((0.0, 0.1, 1.0, 0.0),), -50.0, 30.0, 0.01, 0.2, 0.02, 0.5
+    )
+
+
+def test_the_resolved_scene_is_the_same_again_and_names_what_acts() -> None:
+    scene = with_laws(f"{REF}.laws=[{','.join(LAWS)}]", f"{REF}.regulation={{{PI}}}")
+    again = recorded(scene)
+    assert problem_of(again) == problem_of(scene)
+    active = {effect.name for effect in effects.active(problem_of(scene))}
+    assert {"pantograph_laws", "regulated_lift"} <= active
+    (told,) = kind_lines(scene, problem_of(scene))["reference"]
+    assert told.endswith("; 6 laws not linear; regulated lift")
+
+
+def test_what_is_switched_off_is_left_out() -> None:
+    off = ["effects.pantograph_laws=false", "effects.regulated_lift=false"]
+    laws = f"{REF}.laws=[{','.join(LAWS)}]"
+    simulated = effects.simulated(problem_of(with_laws(laws, f"{REF}.regulation={{{PI}}}", *off)))
+    assert not simulated.pantograph_laws and not simulated.regulated_lift
+
+
+REFUSED = {
+    f"{REF}.laws=[{{type='brake'}}]": "must be of type limiter, damper, spring or friction",
+    f"{REF}.laws=[{{type='limiter',rise_m=0.1}}]": "needs exactly one of stiffness_N_per_m",
+    f"{REF}.laws=[{{type='limiter',stiffness_N_per_m=1e4}}]": "needs rise_m and stiffness_N_per_m",
+    f"{REF}.laws=[{{type='friction',force_N=3,at_mass=3}}]": "the pantograph has 2 masses",
+    f"{REF}.laws=[{{type='damper',up_N_s_per_m=3}}]": "needs up_N_s_per_m and down_N_s_per_m",
+    f"{REF}.laws=[{{type='damper',force_by_velocity=[[-1,5],[1,9]]}}]": "must brake, but has 5 N",
+    f"{REF}.laws=[{{type='spring',force_by_extension=[[0,9],[1,5]]}}]": "must not fall",
+    f"{REF}.laws=[{{type='spring',force_by_extension=[[0,0],[1e-9,5]]}}]": "must not rise by more",
+    f"{REF}.laws=[{{type='limiter',force_by_rise=[[0.1,3],[1,9]]}}]": "must begin with a force",
+    f"{REF}.regulation={{measures='force',target=1,gains=[]}}": "be contact_force or",
+    f"{REF}.regulation={{measures='contact_force',target=1,gains=[{{at=0}}]}}": "a gain above 0",
+    f"{REF}.regulation={{{PI},delay_s=0.015}}": "a delay of whole samples",
+    f"{REF}.regulation={{{PI},sample_s=1e-4}}": "a sample takes at least a step",
+    f"{REF}.regulation={{{PI},least_N=0,most_N=0}}": "room between least_N and most_N",
+    f"{REF}.regulation={{{PI},controller='os.system'}}": "regulation.controller",
+}
+
+
+@pytest.mark.parametrize("word", REFUSED)
+def test_what_cannot_be_is_one_sentence(word: str) -> None:
+    with pytest.raises(InputError) as refused:
+        with_laws(word)
+    assert REFUSED[word] in str(refused.value)
+
+
+def test_a_mechanism_with_all_its_bodies_has_none() -> None:
+    laws = "pantographs.seven_body.laws=[{type='friction',force_N=3}]"
+    with pytest.raises(InputError) as refused:
+        load_scene("ambrosio2012", [laws, "pantographs.seven_body.motion=all_bodies"])
+    assert "reduced to tables only" in str(refused.value)
+
+
+# --- which bodies of a mechanism are moved in the time loop ---------------------------------------
+
+
+BODIES_CASE, BODIES_KIND = "ambrosio2012", "pantographs.seven_body"
+ALL = f"{BODIES_KIND}.motion=all_bodies"
+OWN_KEYS = {"constraint_handling", "substeps"}
+
+
+def with_bodies(*overrides: str) -> Scene:
+    return load_scene(BODIES_CASE, overrides)
+
+
+def data(scene: Scene) -> MultibodyData:
+    found = problem_of(scene).train.placements[0].data
+    assert isinstance(found, MultibodyData)
+    return found
+
+
+def test_a_mechanism_is_reduced_unless_the_scene_says_otherwise() -> None:
+    assert data(with_bodies()).all_bodies is None
+    assert not has_joints(data(with_bodies()))
+    assert not has_joints(LumpedData((1.0,), (0.0,), (0.0,)))
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        ([], AllBodies("coordinate_partitioning", 1)),
+        ([f"{BODIES_KIND}.constraint_handling=baumgarte"], AllBodies("baumgarte", 1)),
+        (
+            [
+                f"{BODIES_KIND}.constraint_handling=augmented_lagrangian",
+                f"{BODIES_KIND}.substeps=4",
+            ],
+            AllBodies("augmented_lagrangian", 4),
+        ),
+    ],
+)
+def test_all_bodies_reach_the_time_loop(overrides: list[str], expected: AllBodies) -> None:
+    found = data(with_bodies(ALL, *overrides))
+    assert found.all_bodies == expected
+    assert has_joints(found)
+
+
+def test_the_model_is_the_one_that_was_asked_for() -> None:
+    from catenary.mbs.build import Operation, make_pantograph
+
+    operation = Operation(150.0, 5.08, Stepping(0.5, 1e-3))
+    assert isinstance(make_pantograph(data(with_bodies(ALL)), operation), FullPantograph)
+    assert isinstance(make_pantograph(data(with_bodies()), operation), RaisingPantograph)
+
+
+@pytest.mark.parametrize("overrides", [[], [ALL], [ALL, f"{BODIES_KIND}.substeps=3"]])
+def test_resolved_scene_is_the_same_again_and_holds_only_what_acts(overrides: list[str]) -> None:
+    scene = with_bodies(*overrides)
+    table = resolved(scene)["pantographs"]["seven_body"]
+    assert OWN_KEYS & set(table) == (OWN_KEYS if overrides else set())
+    again = recorded(scene)
+    assert problem_of(again) == problem_of(scene)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (
+            [f"{BODIES_KIND}.substeps=2"],
+            "substeps with motion = reduced, because it acts only with",
+        ),
+        (
+            [f"{BODIES_KIND}.motion=reduced", f"{BODIES_KIND}.constraint_handling=baumgarte"],
+            "must not have",
+        ),
+        ([ALL, f"{BODIES_KIND}.substeps=0"], f"{BODIES_KIND}.substeps is 0"),
+        ([ALL, f"{BODIES_KIND}.substeps=1.5"], "must be a whole number"),
+        ([ALL, f"{BODIES_KIND}.constraint_handling=lagrange"], "coordinate_partitioning"),
+        ([f"{BODIES_KIND}.motion=full"], "must be reduced or all_bodies"),
+        (
+            [
+                ALL,
+                f"{BODIES_KIND}.strips.mass_kg=1",
+                f"{BODIES_KIND}.strips.stiffness_N_per_m=5000",
+            ],
+            "strips on springs of their own are no bodies",
+        ),
+        (["pantographs.lumped.motion=all_bodies"], "pantographs.lumped.motion on the command line"),
+        ([f"{BODIES_KIND}.nominal_height_m=9"], "-3.973 m away from there, beyond the reach"),
+        ([ALL, f"{BODIES_KIND}.nominal_height_m=9"], "-3.973 m away from there, beyond the reach"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_one_sentence(overrides: list[str], words: str) -> None:
+    with pytest.raises(InputError) as refused:
+        with_bodies(*overrides)
+    assert words in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_bodies_go_where_their_loops_still_close_and_tables_where_they_end() -> None:
+    """0.65 m below its working height the arm is beyond its tables, but not beyond its joints."""
+    below = f"{BODIES_KIND}.nominal_height_m=4.4"
+    assert with_bodies(ALL, below).pantographs["seven_body"].nominal_height_m == 4.4
+    with pytest.raises(InputError, match="beyond the reach of its mechanism"):
+        with_bodies(below)
+    lowest = reduced(data(with_bodies())).heights[0]
+    bodies = data(with_bodies()).system
+    arm = PrescribedPoint("arm low", "stabilisation_arm", Constant(lowest - 0.05))
+    held = bodies.with_joints(arm)
+    closed = held.assemble(bodies.start())
+    assert np.abs(held.constraints(closed, 0.0).value).max() < 1e-9
+
+
+def test_a_wire_beyond_the_bodies_reach_breaks_the_start_in_one_sentence() -> None:
+    pantograph = FullPantograph(data(with_bodies(ALL)), 150.0, 5.08, Stepping(0.5, 1e-3))
+    with pytest.raises(RunBroken, match="'seven_body' does not reach a wire at a height of 9 m"):
+        pantograph.place(9.0)
+
+
+def test_plan_names_the_model_and_counts_its_cost_and_channel() -> None:
+    flushes = "output.flush_every_steps=100"
+    reduced_plan = catenary.plan(with_words(BODIES_CASE, [flushes]))
+    plan = catenary.plan(with_words(BODIES_CASE, [ALL, f"{BODIES_KIND}.substeps=2", flushes]))
+    assert "reduced to tables over its height" in str(reduced_plan)
+    told = "all bodies in the time loop in 2 substeps, joints kept by coordinate_partitioning"
+    assert told in str(plan)
+    n = plan.figures["n_steps"]
+    more = plan.figures["wall_s"] - reduced_plan.figures["wall_s"]
+    expected = estimate_march(0, n, "one_solve", 2) - estimate_march(0, n, "one_solve")
+    assert more == pytest.approx(expected, rel=1e-9)
+    # 0.2 to 0.4 ms a substep.
+    assert 2 * 2e-4 * n < more < 2 * 4e-4 * n
+    # A number a row, in chunks that are kept whole, each with its entry in an index.
+    more = plan.figures["result_B"] - reduced_plan.figures["result_B"]
+    assert 8 * (n + 1) < more < 1.2 * 8 * (n + 1)

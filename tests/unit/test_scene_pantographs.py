@@ -1,28 +1,34 @@
-"""Pantographs in scenes: what tables become, which numbers are published, what is told of them."""
+"""Pantographs in scenes, ready ones, and the verb ``pantograph``."""
 
 from __future__ import annotations
 
+import csv
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
+import verb_runner
 from body_mechanics import generalised
 from measuring import check
 from paper_pantograph import corrections, data, number_at, table
-from scenes import Scene, load_scene, problem_of
+from scenes import Scene, load_scene, problem_of, scene_from, shipped
+from verb_runner import invoke
 
+from catenary import InputError
 from catenary.cases.run.description import header_words, kind_lines
 from catenary.cases.scene.checks.pantographs import check_pantographs
 from catenary.cases.scene.input.case_files import read_toml
 from catenary.cases.scene.keys.keys import is_known, known_keys
 from catenary.cases.scene.scene import static_force
 from catenary.cases.scene.train.multibody import multibody_of
-from catenary.cases.scene.train.pantograph import MultibodyTable
+from catenary.cases.scene.train.pantograph import MultibodyTable, Ready
 from catenary.cases.terminal.lists import key_table
 from catenary.mbs.build import PantographData, actuator_force
-from catenary.mbs.lumped import LumpedData
+from catenary.mbs.lumped import READY, LumpedData
 from catenary.mbs.mechanism.multibody_pantograph import MultibodyData, stand
+from catenary.mbs.response import chain_model
 from catenary.mbs.rigid.bodies import SPACE, Body
 from catenary.mbs.rigid.forces import Actuator, BumpStop, Gravity, PointForce, SpringDamper, Table
 from catenary.mbs.rigid.joints import (
@@ -37,6 +43,9 @@ from catenary.mbs.rigid.joints import (
     RevolutePrismatic,
     Spherical,
 )
+
+# --- pantographs in scenes ------------------------------------------------------------------------
+
 
 TELESCOPE = Path(__file__).parents[1] / "support" / "telescope.toml"
 A, B, ORIGIN = (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.0, 0.0, 0.0)
@@ -249,3 +258,180 @@ def test_keys_of_all_kinds_are_listed_and_known() -> None:
     assert not any(".bodies" in key for key in known_keys(Scene, location))
     kinds = next(row for row in key_table().splitlines() if row.startswith("pantographs.*.type"))
     assert kinds.endswith("one of lumped, multibody")
+
+
+# --- ready pantographs ----------------------------------------------------------------------------
+
+
+# Which case states the same pantograph.
+IN_CASES = {
+    "en50318_2002": ("en50318_2002", "reference"),
+    "en50318_2018": ("ac_simple", "three_masses"),
+    "ambrosio2012": ("ambrosio2012", "lumped"),
+}
+
+
+def with_model(*words: str) -> list[str]:
+    return ["pantographs.ready.model=dsa380", "train.pantographs.0.name=ready", *words]
+
+
+@pytest.mark.parametrize("name", IN_CASES)
+def test_cases_state_the_same_numbers(name: str) -> None:
+    case, kind = IN_CASES[name]
+    scene = load_scene(case, [f"train.pantographs.0.name={kind}"])
+    assert problem_of(scene).train.placements[0].data == READY[name].chain
+
+
+def test_a_scene_takes_chain_and_force() -> None:
+    """DSA380 at 300 km/h: 70 + 0.00095 300^2 + 0.0017 300 - 0.2 = 155.81 N."""
+    place = problem_of(load_scene("ac_simple", with_model("train.speed_km_h=300"))).train.placements
+    assert place[0].data == LumpedData((7.12, 6.0, 5.8), (9430.0, 14100.0, 0.1), (0.0, 0.0, 70.0))
+    assert place[0].static_force == pytest.approx(155.81)
+
+
+def test_the_air_only_lifts() -> None:
+    """The law is negative below 13.6 km/h."""
+    dsa = READY["dsa380"]
+    assert dsa.force_at(5.0) == 70.0
+    assert np.isclose(float(dsa.force_at(20.0) or 0.0), 70.0 + 0.00095 * 400.0 + 0.034 - 0.2)
+
+
+def test_every_ready_pantograph_has_its_name_in_the_schema() -> None:
+    assert get_args(Ready) == tuple(READY)
+
+
+def test_own_force_wins() -> None:
+    scene = load_scene("ac_simple", with_model("pantographs.ready.static_force_N=80"))
+    assert problem_of(scene).train.placements[0].static_force == 80.0
+
+
+def test_the_scene_of_a_result_is_the_same_again() -> None:
+    scene = load_scene("ac_simple", with_model())
+    recorded = replace(scene.origin, recorded=True)  # with every key, as results have them
+    again = scene_from(scene.model_dump(mode="json", exclude_none=True), recorded)
+    assert problem_of(again) == problem_of(scene)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["pantographs.ready.model=dsa38"], "it must be en50318_2002, en50318_2018, dsa380 or"),
+        (["pantographs.ready.model=[1]"], "pantographs.ready.model is"),
+        (["pantographs.ready.masses_kg=[7.0, 6.0, 5.8]"], 'masses_kg beside model = "dsa380"'),
+        (["pantographs.ready.model=en50318_2018"], "exactly one of static_force_N"),
+        (["pantographs.ready.type=multibody"], "does not belong to type multibody"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(words: list[str], said: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load_scene("ac_simple", with_model(*words))
+    assert said in str(refused.value)
+
+
+def test_the_list_names_all_with_their_sources() -> None:
+    told = invoke("list", "--pantographs")
+    assert told.exit_code == 0
+    for name, ready in READY.items():
+        assert name in told.output.splitlines()
+        assert ready.source in told.output
+    both = invoke("list", "--pantographs", "--keys")
+    assert both.exit_code == 2
+
+
+# --- the verb ``pantograph`` ----------------------------------------------------------------------
+
+
+def pantograph_verb(*words: str) -> Any:
+    return verb_runner.invoke("pantograph", *words)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Files and words for EN 50318's two masses, from 0.2 to 40 Hz."""
+    folder = tmp_path_factory.mktemp("pantograph") / "of" / "en"
+    words = ("en50318_2002", "-o", str(folder), "--from", "0.2", "--to", "40", "--points", "31")
+    result = pantograph_verb(*words)
+    assert result.exit_code == 0, result.output
+    return folder, result.output
+
+
+def test_receptance_is_that_of_the_masses(written: tuple[Path, str]) -> None:
+    with (written[0] / "receptance.csv").open(encoding="utf-8", newline="") as stream:
+        header, *rows = csv.reader(stream)
+    assert header == [
+        "frequency_hz",
+        "receptance_real_m_per_N",
+        "receptance_imag_m_per_N",
+    ]
+    frequency, real, imaginary = np.array(rows, dtype=float).T
+    check("frequencies [Hz]", frequency, np.geomspace(0.2, 40.0, 31), within=1e-8)
+    chain = chain_model(LumpedData((7.2, 15.0), (4200.0, 50.0), (10.0, 90.0)))
+    expected = chain.receptance(frequency)
+    found = real + 1j * imaginary
+    # All digits are written: round-off at a resonance of quality 7.
+    check("receptance [m/N]", np.abs(found / expected - 1.0), 0.0, within=1e-12)
+
+
+def test_tables_name_what_was_asked_for(written: tuple[Path, str]) -> None:
+    folder, text = written
+    for words in ("reference of en50318_2002", "mass 1", "7.2", "4200", "4.658", "0.0679"):
+        assert words in text
+    picture = folder / "receptance.png"
+    assert str(picture) in text and picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_fitted_model_runs_in_the_pantograph_s_place(
+    written: tuple[Path, str], tmp_path: Path
+) -> None:
+    """Pasted behind its own case and named on the train it is the same pantograph."""
+    fragment = (written[0] / "lumped.toml").read_text(encoding="utf-8")
+    table = read_toml(written[0] / "lumped.toml")["pantographs"]["reference_lumped"]
+    check("masses [kg]", table["masses_kg"], (7.2, 15.0), within=1e-4)
+    scene = tmp_path / "case.toml"
+    original = shipped()["en50318_2002"].read_text(encoding="utf-8")
+    scene.write_text(f"{original}\n{fragment}", encoding="utf-8")
+    changed = problem_of(load_scene(scene, ["train.pantographs.0.name=reference_lumped"]))
+    (placement,) = changed.train.placements
+    (before,) = problem_of(load_scene("en50318_2002")).train.placements
+    assert placement.static_force == before.static_force == 120.0
+    check("stiffnesses [N/m]", placement.data.stiffnesses, before.data.stiffnesses, within=0.1)
+    again = pantograph_verb(str(scene), "--kind", "reference_lumped", "--fit", "1")
+    assert again.exit_code == 0 and "reference_lumped of en50318_2002" in again.output
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--kind", "other"), "the case has no such pantograph; it has reference"),
+        (("--from", "0"), "frequencies must grow from above 0"),
+        (("--from", "30"), "frequencies must grow from above 0"),
+        (("--points", "1"), "--points 1 must be between 2"),
+        (("--fit", "4"), "1 to 3 masses, not of 4"),
+        (("--fit-from", "50"), "--fit-from 50 must be above 0 Hz and below --to 25"),
+    ],
+)
+def test_mistakes_end_in_a_sentence(words: tuple[str, ...], sentence: str) -> None:
+    result = pantograph_verb("en50318_2002", *words)
+    assert result.exit_code == 2 and sentence in result.output.replace("\n", " "), result.output
+
+
+def test_files_are_not_overwritten_unless_told_to(written: tuple[Path, str]) -> None:
+    folder = written[0]
+    result = pantograph_verb("en50318_2002", "-o", str(folder))
+    assert (
+        result.exit_code == 2 and "receptance.csv is there already; name another" in result.output
+    )
+    result = pantograph_verb("en50318_2002", "-o", str(folder / "receptance.csv"))
+    assert result.exit_code == 2 and "is a file; name a folder" in result.output
+    before = (folder / "receptance.csv").read_bytes()
+    assert pantograph_verb("en50318_2002", "-o", str(folder), "--force").exit_code == 0
+    assert (folder / "receptance.csv").read_bytes() != before
+
+
+def test_laws_that_are_left_out_are_named() -> None:
+    law = "{type = 'damper', at_mass = 2, up_N_s_per_m = 500.0, down_N_s_per_m = 900.0}"
+    words = ("en50318_2002", f"pantographs.reference.laws=[{law}]")
+    sentence = "left out: the pantograph's laws, which are not linear"
+    assert sentence in pantograph_verb(*words).output
+    assert sentence not in pantograph_verb(*words, "effects.pantograph_laws=false").output
+    assert sentence not in pantograph_verb("en50318_2002").output

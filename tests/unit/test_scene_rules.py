@@ -1,9 +1,15 @@
-"""Rule books in scenes: which judge, what is refused, and what a result file keeps of them."""
+"""Rule books in scenes, on pages, on the terminal and in the table of a sweep."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import math
+import re
+import tomllib
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from scenes import Scene, load_scene, read_draft, recorded, resolved, scene_from
@@ -12,7 +18,16 @@ from verb_runner import invoke
 from catenary import InputError
 from catenary.cases.scene.input.faults import Origin
 from catenary.cases.scene.run.case import LimitsTable, chosen_books, rule_entries
-from catenary.postproc.standards.rule_books import LIMIT_KEYS
+from catenary.cases.studies.sweep.jobs import Ended
+from catenary.cases.studies.sweep.output import table_of
+from catenary.cases.studies.sweep.variants import Variant
+from catenary.cases.terminal.terminal_text import _acceptance
+from catenary.postproc.evaluate.compare import _judged
+from catenary.postproc.evaluate.verdict import Criterion
+from catenary.postproc.standards.rule_books import LIMIT_KEYS, QUANTITIES, book_of, shipped
+
+# --- rule books in scenes -------------------------------------------------------------------------
+
 
 CASE = "en50318_2002"
 OWN = """name = "mine"
@@ -189,3 +204,115 @@ def test_list_refuses_an_unknown_book_and_two_lists() -> None:
     assert done.exit_code == 2 and "did you mean en50367:20" in done.output
     both = invoke("list", "--rules", "--keys")
     assert both.exit_code == 2 and "--keys and --rules" in both.output
+
+
+# --- pages about rule books -----------------------------------------------------------------------
+
+
+ROOT = Path(__file__).parents[2]
+GUIDE = (ROOT / "docs/guide/rules.md").read_text(encoding="utf-8")
+BLOCKS = [tomllib.loads(text) for text in re.findall(r"```toml\n(.*?)```", GUIDE, re.S)]
+
+
+def test_the_reference_has_every_criterion_quantity_and_key() -> None:
+    spec = importlib.util.spec_from_file_location("pages", ROOT / ".site/generated_pages.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    sections = module.rules_page().split("\n## ")
+    for (key, book), section in zip(shipped().items(), sections[1:], strict=False):
+        assert section.startswith(f"{key}\n")
+        rows = [line for line in section.splitlines() if line.startswith("| ")][1:]
+        assert len(rows) == len(book.criteria)
+        for rule, row in zip(book.criteria, rows, strict=True):
+            assert rule.title in row and f"`{rule.quantity}`" in row and rule.words() in row
+            assert ("| not compared with the text" in row) is not book.is_compared(rule)
+    assert all(f"| `{name}` |" in sections[-2] for name in QUANTITIES)
+    assert all(f"| `{name}` |" in sections[-1] for name in LIMIT_KEYS)
+
+
+def test_the_guide_tells_every_book() -> None:
+    rows = "\n".join(line for line in GUIDE.splitlines() if line.startswith("| `"))
+    assert {book.name for book in shipped().values() if f"`{book.name}" not in rows} == set()
+
+
+def test_the_books_that_the_guide_chooses_judge_a_scene() -> None:
+    chosen, limits = BLOCKS[0]["evaluation"], BLOCKS[0]["evaluation"].pop("limits")
+    values = [(f"evaluation.{key}", value, "in the guide") for key, value in chosen.items()]
+    values += [(f"evaluation.limits.{key}", value, "in the guide") for key, value in limits.items()]
+    scene = read_draft("en50318_2002").assigned(values).scene()
+    judged = [book.key for book in chosen_books(scene.evaluation)]
+    assert judged == ["en50367:2020", "tsi_ene:2023", "line"]
+
+
+def test_the_book_of_the_guide_is_one() -> None:
+    book = book_of(BLOCKS[1], "the book of the guide")
+    assert book.key == "my_line:2026" and len(book.criteria) == 2
+    assert book.criteria[1].words() == ("< 250 N (AC, up to 160 km/h); 0.0025 v^2 + 70 N (AC)")
+
+
+# --- criteria of several rule books on the terminal and in the table of a sweep -------------------
+
+
+def judged(book: str, passed: bool | None, compared: bool = False) -> dict[str, Any]:
+    return {
+        "criterion": "arcing NQ",
+        "value": 0.15,
+        "limit": 0.2 if passed else 0.1,
+        "unit": "%",
+        "passed": passed,
+        "book": book,
+        "compared": compared,
+    }
+
+
+LEFT = {"criterion": "tension of the contact wire", "book": "line", "because": "there is none"}
+
+
+def test_one_book_needs_no_name() -> None:
+    lines = _acceptance({"acceptance": [judged("en50367:2020", True)], "not_judged": []})
+    assert lines == [
+        "  passed      arcing NQ: 0.15, limit 0.20 % *",
+        "  * limit not compared with the text of the standard",
+    ]
+
+
+def test_a_value_at_a_limit_that_it_must_not_reach() -> None:
+    row = {**judged("own", False, compared=True), "value": 350.0, "limit": 350.0, "relation": "<"}
+    told = _acceptance({"acceptance": [row], "not_judged": []})
+    assert told == ["  FAILED      arcing NQ: 350.00, limit < 350.00 %"]
+
+
+def test_runs_side_by_side_show_what_fails_by_little() -> None:
+    one = Criterion("arcing NQ", 0.2046, 0.2, "%", "<=", False, "", compared=True)
+    assert _judged(one) == "0.205 % FAILED"
+    assert _judged(replace(one, value=0.5)) == "0.50 % FAILED"
+    assert _judged(replace(one, value=math.nan, passed=None)) == "no value, not judged"
+
+
+def test_books_are_named_and_limits_marked() -> None:
+    rows = [judged("tsi_ene:2023", False), judged("line", True, compared=True)]
+    summary = {"acceptance": rows, "not_judged": [LEFT], "judged_by": "TSI", "passed": False}
+    assert _acceptance(summary) == [
+        "  FAILED      arcing NQ (tsi_ene:2023): 0.15, limit 0.10 % *",
+        "  passed      arcing NQ (line): 0.15, limit 0.20 %",
+        "  not judged  tension of the contact wire (line), because there is none",
+        "  NOT PASSED by TSI",
+        "  * limit not compared with the text of the standard",
+    ]
+    rows[0] = judged("tsi_ene:2023", True, compared=True)
+    assert _acceptance({**summary, "acceptance": rows, "passed": True})[-1] == "  PASSED by TSI"
+    assert _acceptance({**summary, "acceptance": [], "passed": None})[-1] == "  NOT JUDGED by TSI"
+
+
+def test_a_sweep_tells_books_and_what_they_did_not_judge() -> None:
+    rows = [judged("tsi_ene:2023", False), judged("line", True)]
+    summary = {"acceptance": rows, "not_judged": [LEFT], "passed": False, "pantographs": [{}]}
+    (row,) = table_of([Ended(Variant("a", (), {}), "done", summary)]).records()
+    assert row["rules"] == ["tsi_ene:2023", "line"]
+    assert row["failed"] == ["arcing NQ (tsi_ene:2023)"]
+    assert row["not_judged"] == ["tension of the contact wire (line)"]
+    # A table of an earlier version has no books.
+    old = {"acceptance": [{"criterion": "arcing NQ", "passed": False}], "passed": False}
+    (row,) = table_of([Ended(Variant("a", (), {}), "done", old)]).records()
+    assert (row["rules"], row["failed"], row["not_judged"]) == ([], ["arcing NQ"], [])

@@ -27,7 +27,7 @@ ELSEWHERE = re.compile(
             r"case\b|test\b|petsc\b|output\b|evaluation\b|mesh\.file|.*_file$|.*\.name$",
             # What each effect adds: test_effects_counting.
             r"effects\b",
-            # Mechanisms as data, and which of their bodies move: test_ready_pantographs,
+            # Mechanisms as data, and which of their bodies move: test_scene_pantographs,
             # test_scene_motion.
             r"pantographs\.\*\.(corrections|bodies|joints|forces|head|arm|actuator|calibrate)\b",
             r"pantographs\.\*\.(assembly_tolerance_m|constraint_handling|substeps|as_published)",

@@ -1,13 +1,16 @@
-"""Dimensions of a result file have names and units, as readers of netCDF-4 want them."""
+"""Dimensions and further channels of a result file, and the tables that document them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
+from catenary.postproc.files.facts import FACTS
 from catenary.postproc.files.run_schema import (
     COMPLETE,
     RunAttributes,
@@ -16,6 +19,11 @@ from catenary.postproc.files.run_schema import (
     growing_tables,
 )
 from catenary.postproc.read.results import Results
+from catenary.postproc.report.pictures import force_pictures
+from catenary.postproc.report.report import write_report
+from catenary.solver.time_loop.views.channels import CHANNELS, ENERGIES, RUN, TrainLayout
+
+# --- dimensions of a result file have names and units, as readers of netCDF-4 want them -----------
 
 
 @pytest.fixture(scope="module")
@@ -139,3 +147,82 @@ def test_a_file_without_names_is_read(run_folder: Path, tmp_path: Path) -> None:
     with Results(tmp_path) as bare, Results(run_folder) as whole:
         assert bare.damage == whole.damage == []
         np.testing.assert_array_equal(bare.channel("contact_force"), whole.channel("contact_force"))
+
+
+# --- the strips' shares of the contact force ------------------------------------------------------
+
+
+@pytest.fixture
+def with_strips(make_march: Any) -> Any:
+    """Two pantographs: one strip, and two that carry 60 and 40 %."""
+
+    class Striped(make_march):  # type: ignore[misc]
+        def stage(self, first_step: int = 0) -> Any:
+            return replace(super().stage(first_step), train=TrainLayout((1, 2)))
+
+        def more(self, step: int) -> Any:
+            leading, trailing = self.force(step * self.dt)
+            return {"strip_force": np.array([leading, 0.6 * trailing, 0.4 * trailing])}
+
+    return Striped(n_steps=600)
+
+
+def test_each_strip_has_a_column(tmp_path: Path, with_strips: Any, record_run: Any) -> None:
+    record_run(tmp_path / "run.h5", with_strips)
+    with Results(tmp_path) as results:
+        assert results.n_strips() == [1, 2]
+        assert results.strip_columns() == [range(0, 1), range(1, 3)]
+        one, two = np.split(results.channel("strip_force"), [1], axis=1)
+        force = results.channel("contact_force")
+        np.testing.assert_array_equal(one, force[:, :1])
+        np.testing.assert_allclose(two, force[:, 1:] * [0.6, 0.4], rtol=1e-15)
+        figure = force_pictures.strip_forces(results)
+        assert len(figure.axes) == 1
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file["channels/strip_force"].attrs["unit"] == b"N"
+
+
+@pytest.mark.usefixtures("quick_report")
+def test_the_report_shows_them(tmp_path: Path, with_strips: Any, record_run: Any) -> None:
+    record_run(tmp_path / "run.h5", with_strips)
+    write_report(tmp_path, tmp_path)
+    assert (tmp_path / "strip_forces.png").is_file()
+    assert "Shares of the collector strips" in (tmp_path / "report.html").read_text()
+
+
+def test_runs_of_single_strips_have_no_such_channel(run_folder: Path) -> None:
+    with h5py.File(run_folder / "run.h5", locking=False) as file:
+        assert "strip_force" not in file["channels"]
+    with Results(run_folder) as results:
+        assert results.n_strips() == [1, 1]
+        assert not results.several_strips and not results.has("strip_force")
+
+
+# --- the tables of docs/architecture.md that are written down in the code too are the same --------
+
+
+DOCUMENT = Path(__file__).parents[3] / "docs" / "architecture.md"
+
+
+def tables_of_the_page() -> dict[str, list[str]]:
+    """Lines of each table, by the name in the comments around it."""
+    facts = [
+        f"| `{name}` | {fact.unit} | {fact.per if fact.per != RUN else ''} | {fact.meaning} |"
+        for name, fact in FACTS.items()
+    ]
+    channels = [
+        f"| `{channel.name}` | {channel.unit} | {channel.per} | {channel.meaning} |"
+        for channel in (*CHANNELS.values(), *ENERGIES.values())
+        if channel.values or channel.energy
+    ]
+    return {
+        "facts": ["| fact | unit | of each | |", "|---|---|---|---|", *facts],
+        "channels": ["| channel | unit | per | |", "|---|---|---|---|", *channels],
+    }
+
+
+@pytest.mark.parametrize("name", tables_of_the_page())
+def test_a_table_is_the_one_in_the_code(name: str) -> None:
+    text = DOCUMENT.read_text(encoding="utf-8")
+    shown = text.split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
+    assert shown.split("\n")[2:-2] == tables_of_the_page()[name]

@@ -1,19 +1,31 @@
-"""Statistics of signals whose statistics are known in closed form."""
+"""Statistics and filters of signals that are known in closed form, and derivatives."""
 
 from __future__ import annotations
 
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
+from measuring import check
+from scipy import signal
 
+from catenary import InputError
+from catenary.postproc.evaluate import filters, statistics
 from catenary.postproc.evaluate import statistics as stats
 from catenary.postproc.evaluate.error_indicators import indicate
 from catenary.postproc.evaluate.observations import ObservedRun
+from catenary.postproc.evaluate.statistics import contact_statistics, evaluate
+from catenary.postproc.files.committed_rows import FILTERED_FORCE, ForceFilter
 from catenary.postproc.read.results import Results
+from catenary.postproc.record.recorder import Recorder
+from catenary.results import Run
+
+# --- statistics of signals whose statistics are known in closed form ------------------------------
+
 
 DT, SPEED = 1e-3, 100.0
 TIME = DT * np.arange(12001)
@@ -119,12 +131,12 @@ def test_each_pantograph_is_evaluated_at_its_own_position(run_folder: Path, marc
         force = results.channel("contact_force")
         position = results.channel("contact_position")
         low, high = results.evaluation
-    for p, statistics in enumerate(found.pantographs):
+    for p, own in enumerate(found.pantographs):
         within = (position[:, p] >= low) & (position[:, p] <= high)
         slow = np.hypot(30.0 + 6.0 * p, 15.0 + 5.0 * p) / np.sqrt(2)
         # The stretch holds no whole number of periods: 1 part in 6 periods of the slowest.
-        assert statistics.std == pytest.approx(slow, rel=0.1)
-        assert statistics.mean == pytest.approx(force[within, p].mean(), abs=0.1)
+        assert own.std == pytest.approx(slow, rel=0.1)
+        assert own.mean == pytest.approx(force[within, p].mean(), abs=0.1)
     assert found.pantographs[0].mean != found.pantographs[1].mean
     assert [p.name for p in found.pantographs] == ["leading", "trailing"]
 
@@ -201,3 +213,235 @@ def test_a_stretch_of_a_few_samples_gives_a_sentence_instead_of_figures(
     # There are figures, by which nothing is judged.
     assert not any(np.isnan(p.std) for p in longer.pantographs)
     assert all("shorter than a span" in sentence for sentence in longer.complaints)
+
+
+# --- filters --------------------------------------------------------------------------------------
+
+
+MIDDLE = slice(4000, 8000)  # whole periods of every whole frequency, four seconds from the ends
+
+
+def in_phase_and_out(signal: np.ndarray, frequency: float) -> tuple[float, float]:
+    """Components of a record along sin and cos of a frequency."""
+    t = TIME[MIDDLE]
+    s, c = np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)
+    return 2 * float(np.mean(signal[MIDDLE] * s)), 2 * float(np.mean(signal[MIDDLE] * c))
+
+
+def theory(frequency: float, cut_off: float) -> float:
+    """Squared gain of a digital 6th-order Butterworth low-pass (bilinear transform, prewarped)."""
+    ratio = np.tan(np.pi * frequency * DT) / np.tan(np.pi * cut_off * DT)
+    return 1.0 / (1.0 + ratio**12)
+
+
+@pytest.mark.parametrize(("frequency", "expected"), [(5.0, 1.0), (20.0, 0.5), (40.0, 2.4e-4)])
+def test_the_low_pass_has_butterworths_gain_and_no_phase(frequency: float, expected: float) -> None:
+    passed = filters.low_pass(np.sin(2 * np.pi * frequency * TIME), DT)
+    gain, out_of_phase = in_phase_and_out(passed, frequency)
+    # The design is exact; what remains are the ends of the record, decayed by exp(-32 * 4).
+    assert gain == pytest.approx(theory(frequency, 20.0), rel=1e-6, abs=1e-9)
+    assert abs(out_of_phase) < 1e-9
+    # The round numbers of the continuous filter hold to the warping at 40 Hz, 6 (pi f dt)^2.
+    assert gain == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "low", "high"), [(1.0, 1, 0), (5.0, 0.5, 0.5), (10.0, 0, 1), (20.0, 0, 0.5)]
+)
+def test_the_bands_share_the_spectrum(frequency: float, low: float, high: float) -> None:
+    signal = np.sin(2 * np.pi * frequency * TIME)
+    for band, expected in ((filters.band_0_5, low), (filters.band_5_20, high)):
+        gain, out_of_phase = in_phase_and_out(band(signal, DT), frequency)
+        # Leakage of one octave: 2^-12 = 2.4e-4.
+        assert gain == pytest.approx(expected, abs=5e-4)
+        assert abs(out_of_phase) < 1e-6
+
+
+def test_mean_belongs_to_the_low_band_only() -> None:
+    constant = np.full(TIME.size, 150.0)
+    np.testing.assert_allclose(filters.low_pass(constant, DT), 150.0, rtol=1e-9)
+    np.testing.assert_allclose(filters.band_0_5(constant, DT), 150.0, rtol=1e-9)
+    np.testing.assert_allclose(filters.band_5_20(constant, DT), 0.0, atol=1e-6)
+
+
+def test_ends_of_the_record_are_not_pulled_to_zero() -> None:
+    # A slow trend must come out as it went in, up to the ends: the record is continued oddly.
+    ramp = 100.0 + 20.0 * TIME
+    np.testing.assert_allclose(filters.low_pass(ramp, DT), ramp, atol=1e-6)
+
+
+def test_columns_are_filtered_one_by_one() -> None:
+    signals = np.column_stack([np.sin(2 * np.pi * f * TIME) for f in (3.0, 15.0, 60.0)])
+    together = filters.low_pass(signals, DT)
+    for column in range(3):
+        np.testing.assert_array_equal(together[:, column], filters.low_pass(signals[:, column], DT))
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 10])
+def test_short_records_pass_without_an_error(n: int) -> None:
+    assert filters.low_pass(np.ones(n), DT) == pytest.approx(np.ones(n))
+
+
+@pytest.mark.parametrize("dt", [0.025, 0.03])
+def test_too_slow_sampling_is_refused_with_a_sentence(dt: float) -> None:
+    with pytest.raises(InputError, match=rf"dt_s = {dt:g} s .* must be below 0.025 s"):
+        filters.low_pass(np.ones(100), dt)
+
+
+def test_sampling_just_fast_enough_is_accepted() -> None:
+    filters.check_sampling(0.0249)
+
+
+# --- the filtered contact force in a result file --------------------------------------------------
+
+
+FILTER = ForceFilter(filters.ABOUT, filters.low_pass)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory, make_march: Any, record_run: Any) -> Path:
+    """The folder of a run that is done."""
+    folder: Path = tmp_path_factory.mktemp("filtered")
+    record_run(folder / "run.h5", make_march(n_steps=2000), force_filter=lambda: FILTER)
+    return folder
+
+
+def test_the_file_holds_the_force_that_scipys_filter_gives(done: Path) -> None:
+    with Results(done) as results:
+        force, stored = results.channel("contact_force"), results.stored_filtered_force()
+    assert stored is not None and stored[1]["cut_off_Hz"] == 20.0
+    sos = signal.butter(6, 20.0, fs=1000.0, output="sos")
+    expected = signal.sosfiltfilt(sos, force, axis=0, padlen=300)
+    np.testing.assert_array_equal(stored[0], expected)
+    with h5py.File(done / "run.h5", "r") as file:
+        table = file[FILTERED_FORCE]
+        assert [dim[0].name for dim in table.dims] == ["/time", "/pantograph"]
+        assert table.fletcher32 and table.attrs["unit"] == b"N" and table.attrs["order"] == 6
+
+
+def test_python_reads_it_and_makes_it_where_there_is_none(done: Path, run_folder: Path) -> None:
+    with Run(Results(done)) as run:
+        found = run.filtered_force
+        assert found.dims == ("time", "pantograph") and found.attrs["filter"].startswith("low-pass")
+        np.testing.assert_array_equal(found, filters.low_pass(run.force.values, 1e-3))
+    with Run(Results(run_folder)) as run:  # a file as earlier versions wrote them
+        assert run._results.stored_filtered_force() is None
+        expected = filters.low_pass(run.force.values, 1e-3)
+        np.testing.assert_array_equal(run.filtered_force, expected)
+        assert run.filtered_force.attrs["cut_off_Hz"] == 20.0
+
+
+def test_statistics_and_indicators_are_the_same_with_and_without_it(
+    tmp_path: Path, make_march: Any, record_run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
+    record_run(whole, make_march(), force_filter=lambda: FILTER)
+    shutil.copyfile(whole, path)
+    with h5py.File(path, "r+") as file:
+        del file[FILTERED_FORCE]
+    with Results(path) as without:
+        expected = evaluate(without), indicate(without)
+        force = filters.contact_force(without, 0)
+    filtered, low_pass = [], filters.low_pass
+
+    def counted(values: np.ndarray, dt: float, cut_off: float = filters.CUT_OFF) -> np.ndarray:
+        filtered.append((cut_off, values))
+        return low_pass(values, dt, cut_off)
+
+    monkeypatch.setattr(filters, "low_pass", counted)
+    with Results(whole) as results:
+        found = evaluate(results), indicate(results)
+        np.testing.assert_array_equal(filters.contact_force(results, 0), force)
+        heights = [results.column("wire_height", p) for p in range(2)]
+    # What the file has passes no filter: at 20 Hz heights of the contact point alone do.
+    at_20_hz = [values for cut_off, values in filtered if cut_off == filters.CUT_OFF]
+    np.testing.assert_array_equal(at_20_hz, heights)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_equal(asdict(one), asdict(other))
+
+
+def test_a_run_that_goes_on_has_none_of_its_earlier_end(
+    done: Path, tmp_path: Path, make_march: Any
+) -> None:
+    path = tmp_path / "run.h5"
+    shutil.copyfile(done / "run.h5", path)
+    march = make_march(n_steps=2000)
+    recorder = Recorder(march.comm, path, march.header(), resume=True, force_filter=lambda: FILTER)
+    march.drive(recorder, outcome="interrupted", first_step=2000)
+    recorder.close()
+    with Results(path) as results:
+        assert results.outcome == "interrupted" and results.stored_filtered_force() is None
+
+
+def test_a_damaged_one_is_left_aside(done: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    shutil.copyfile(done / "run.h5", path)
+    with h5py.File(path, "r") as file:
+        chunk = file[FILTERED_FORCE].id.get_chunk_info(0)
+    content = bytearray(path.read_bytes())
+    content[chunk.byte_offset + 7] ^= 0xFF
+    path.write_bytes(content)
+    with Results(path) as results:
+        assert results.stored_filtered_force() is None
+        assert not results.damage  # what it was made of is there
+
+
+# --- derivatives of statistics beside differences of the statistics themselves --------------------
+
+
+STEP, N = 2e-3, 4000
+NAMES = {"mean": "mean", "std": "std", "maximum": "maximum", "minimum": "minimum",
+         "stat_max": "stat_max", "stat_min": "stat_min"}  # fmt: skip
+
+
+def records(seed: int) -> np.ndarray:
+    """Noise with some slow waves, (N,)."""
+    random = np.random.default_rng(seed)
+    time = STEP * np.arange(N)
+    waves = sum(np.sin(2 * np.pi * f * time + random.uniform(0, 6)) for f in (0.7, 1.3, 6.0))
+    return np.asarray(20.0 * waves + 5.0 * random.standard_normal(N))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_statistics_change_as_differences_of_them(name: str) -> None:
+    position, evaluation = 70.0 * STEP * np.arange(N), (100.0, 400.0)
+    within = (position >= evaluation[0]) & (position <= evaluation[1])
+    force, by_force = 120.0 + records(1), records(2)
+    found = statistics.force_derivatives(force, by_force[:, None], within, STEP)
+    step = 1e-6
+    both = [
+        getattr(contact_statistics("", position, own, own, STEP, evaluation), NAMES[name])
+        for own in (force + step * by_force, force - step * by_force)
+    ]
+    # Round-off of some 100 N over twice the step.
+    expected = (both[0] - both[1]) / (2.0 * step)
+    check(name, getattr(found, name), expected, within=1e-6)
+
+
+def test_records_are_compared_at_equal_places() -> None:
+    """A force that depends on the place alone keeps its statistics at any speed."""
+    speed, place = 70.0, 70.0 * STEP * np.arange(N)
+    number = 2 * np.pi / 50.0
+    force = 120.0 + 30.0 * np.sin(number * place)
+    by_force = (30.0 * number * np.cos(number * place) * place / speed)[:, None]
+    within = (place >= 100.0) & (place <= 400.0)
+    by_place = (place / speed / speed)[:, None]  # per m/s, over the speed
+    found = statistics.force_derivatives(force, by_force, within, STEP, by_place)
+    moved = statistics.force_derivatives(force, by_force, within, STEP)
+    # Differences of the fourth order of a wave of 714 records: (2 pi / 357)^4 / 30 of its slope.
+    check("std", found.std, 0.0, within=1e-6)
+    check("mean", found.mean, 0.0, within=1e-6)
+    assert abs(moved.std[0]) > 1e-3 or abs(moved.mean[0]) > 1e-3
+
+
+def test_the_largest_of_several_columns_changes_as_its_record() -> None:
+    values = np.array([[1.0, 2.0], [5.0, 3.0], [4.0, 4.5]])
+    by_values = np.arange(12.0).reshape(3, 2, 2)
+    assert statistics.largest_derivatives(values, by_values).tolist() == by_values[1, :, 0].tolist()
+    assert np.isnan(statistics.largest_derivatives(values[:, :0], by_values[..., :0])).all()
+
+
+def test_a_force_that_never_changes_has_no_sigma_that_does() -> None:
+    flat = np.full(N, 100.0)
+    found = statistics.force_derivatives(flat, records(3)[:, None], np.ones(N, dtype=bool), STEP)
+    assert np.isfinite(found.std).all()

@@ -26,6 +26,7 @@ from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.head.stepping import LateralPath, Stepping
 from catenary.mbs.head.strips import Turning
 from catenary.meshgen.mesh import LineMesh
+from catenary.meshgen.topologies.all_topologies import make_line
 from catenary.solver.effects import all_effects as effects
 from catenary.solver.effects.build_model import build
 from catenary.solver.effects.effect import Limit
@@ -33,6 +34,9 @@ from catenary.solver.model.model import Model
 from catenary.solver.problem.contact_laws import LinearLaw
 from catenary.solver.problem.defects import Irregularities, TensionLoss
 from catenary.solver.problem.problem import Damping
+from catenary.solver.statics.form_finding import find_form
+
+# --- what a scene leaves out does not exist -------------------------------------------------------
 
 
 def expected_terms(terms: object, n: dict[str, int]) -> int:
@@ -187,8 +191,8 @@ def test_no_effect_is_found_by_its_name() -> None:
 
 def test_the_table_names_every_shipped_effect() -> None:
     """A new effect must be counted here as well; what depends on the matrices of others stands in
-    `test_absorbing_layers.py`, `test_periodic_ends.py`, `test_axial_counting.py`; what twin wires
-    have in `test_twin_counting.py`, stiff links in `test_stiff_links.py`."""
+    `test_planes_counting.py`, `test_periodic_ends.py`, `test_planes_counting.py`; what twin wires
+    have in `test_planes_counting.py`, stiff links in `test_planes_counting.py`."""
     elsewhere = {"absorbing_layers", "periodic_ends", "axial_motion", "tensioners", "temperature"}
     elsewhere |= {"lateral_motion", "relative_motion", "stiff_link_damping"}
     assert set(effects.registry()) == {"vertical", *elsewhere, *BLOCKS}
@@ -322,3 +326,84 @@ def test_a_head_has_a_roll_only_if_asked() -> None:
     for lateral, size in ((None, 6), (path, 9)):
         operation = Operation(120.0, 5.5, Stepping(0.5, 1e-3, lateral=lateral))
         assert make_pantograph(data, operation).state().size == size
+
+
+# --- weights, masses, pre-sag, springs and damping of a line, effect by effect --------------------
+
+
+def test_a_slack_dropper_keeps_a_share_only_if_droppers_slacken(mesh: LineMesh) -> None:
+    residual = {"residual_dropper_stiffness"}
+    assert model_with(residual, mesh).simulated.kept_ratio == 1.0
+    both = model_with(residual | {"dropper_slackening"}, mesh).simulated
+    assert (both.slackening, both.kept_ratio) == (True, 0.01)
+
+
+def test_weights_are_those_of_the_masses_that_exist(mesh: LineMesh) -> None:
+    """Gravity acts on what the other effects hang on the line, half of a hinged arm included."""
+    line, n = full_line(), counts(mesh)
+    gravity = 9.81
+    wires = line.support_positions[-1] * (
+        line.contact_wire.mass_per_length + line.messenger_wire.mass_per_length
+    )
+    clamps = n["droppers"] * (line.dropper.upper_clamp_mass + line.dropper.lower_clamp_mass)
+    droppers = n["droppers"] * line.dropper.mass_per_length * 1.0  # all 1 m long here
+    arm = line.steady_arm
+    arms = n["arms"] * (0.5 * arm.mass_per_length * arm.length + arm.clamp_mass)
+    hanging = {
+        frozenset(): wires,
+        frozenset({"clamp_mass"}): wires + clamps,
+        frozenset({"dropper_mass"}): wires + droppers,
+        frozenset({"arm_inertia"}): wires + arms,
+        frozenset({"clamp_mass", "dropper_mass", "arm_inertia"}): wires + clamps + droppers + arms,
+    }
+    for names, mass in hanging.items():
+        model = model_with(names | {"gravity"}, mesh)
+        vertical = model.weight[model.dofs(np.arange(mesh.n_nodes))]
+        assert vertical.sum() == pytest.approx(-gravity * mass, rel=1e-13)
+
+
+def test_form_finding_knows_pre_sag_and_transitions_only_if_asked(mesh: LineMesh) -> None:
+    whole = BARE | {"gravity", "pre_sag", "transition_spans"}
+    lower = mesh.droppers[:, 1]
+    level, line = 5.08, full_line()
+    sag = np.concatenate([np.asarray(span) for span in line.pre_sag])
+    profile = make_line(line).wire("contact_wire").profile
+    assert profile is not None
+    rise = profile.level(mesh.x(lower)) - level
+    for names, expected in (
+        (whole, level + rise - sag),
+        (whole - {"pre_sag"}, level + rise),
+        (whole - {"transition_spans"}, level - sag),
+        (BARE | {"gravity"}, np.full(lower.size, level)),
+    ):
+        _, form = find_form(full_problem(names), mesh)
+        assert form.height[lower] == pytest.approx(expected, abs=1e-14)
+    _, form = find_form(full_problem(BARE), mesh)
+    assert not form.dropper_force.any()
+
+
+def test_droppers_are_springs_of_their_stiffness_or_of_their_length(mesh: LineMesh) -> None:
+    lengths = np.linspace(0.8, 1.2, mesh.droppers.shape[0])
+    given = full_problem(BARE)
+    by_length = with_dropper(given, stiffness=None, axial_stiffness=8e4)
+    assert build(given, mesh, lengths).dropper_stiffness == pytest.approx(1e5)
+    model = build(by_length, mesh, lengths)
+    assert model.dropper_stiffness == pytest.approx(8e4 / lengths, rel=1e-15)
+    (links,) = [block for block in model.blocks if block.component == "droppers"]
+    assert links.stiffness[3, 0, 1] == pytest.approx(-8e4 / lengths[3], rel=1e-15)
+    damped = replace(given, effects=BARE | {"structural_damping"})
+    alpha = given.damping.alpha
+    assert build(damped, mesh, lengths).dropper_damping == pytest.approx(alpha * 1e5, rel=1e-15)
+
+
+def test_damping_may_differ_from_component_to_component(mesh: LineMesh) -> None:
+    lengths = np.ones(mesh.droppers.shape[0])
+    damping = Damping(1e-4, 0.01, {"droppers": (1e-3, 0.0)})
+    on = replace(full_problem(BARE | {"structural_damping"}), damping=damping)
+    model = build(on, mesh, lengths)
+    assert model.damping_of("droppers") == (1e-3, 0.0)
+    assert model.damping_of("contact_wire") == (1e-4, 0.01)
+    assert not model.damping_is_proportional
+    off = build(replace(on, effects=BARE), mesh, lengths)
+    assert off.damping_of("droppers") == (0.0, 0.0)
+    assert off.damping_is_proportional

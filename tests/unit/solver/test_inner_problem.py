@@ -1,14 +1,17 @@
-"""The small problem of a step: contact forces and slack droppers, against its own definition."""
+"""The small problem of a step: forces, slack droppers, links within bounds, zeros of maps."""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mpi4py import MPI
+from scenes import load_scene, mesh_of, problem_of
 
 from catenary.solver.contact.forces_on_line import no_links
 from catenary.solver.contact.pantographs import Heads
@@ -18,6 +21,12 @@ from catenary.solver.contact_problem.force_exchange import LineResponse
 from catenary.solver.contact_problem.law_tangents import HertzInSteps, LawInSteps
 from catenary.solver.kernels import native
 from catenary.solver.problem.contact_laws import HertzLaw, LinearLaw
+from catenary.solver.schemes.scheme import OneSolve
+from catenary.solver.statics.line_at_rest import line_at_rest
+from catenary.solver.time_loop.march import March
+
+# --- the small problem of a step ------------------------------------------------------------------
+
 
 EPS = np.finfo(float).eps
 
@@ -256,3 +265,157 @@ def test_contacts_beside_droppers_that_lost_much_find_their_force() -> None:
     # Known to 1e-12 m/s, the rounding of 470, on a slope of 5e6 N s/m.
     assert force == pytest.approx(found.contact_force, abs=1e-5)
     assert (force > 1.0).all()
+
+
+# --- which links have a row in the small problem --------------------------------------------------
+
+
+# A stiff wire, which goes down between the droppers beside the one that the head lifts after the
+# first, long step. Each wire has a contact with the head.
+DT = 8e-3
+WORDS = [
+    "line.n_spans=6", "line.dropper.stiffness_N_per_m=1e5", f"numerics.dt_s={DT}",
+    "line.contact_wire.bending_stiffness_N_m2=1e5",
+    "train.start_m=137", "train.end_m=150", "train.raise_time_s=0",
+    "evaluation.from_m=140", "evaluation.to_m=145",
+]  # fmt: skip
+Rows = Callable[[tuple[float, float], float], list[int]]
+
+
+@pytest.fixture
+def rows(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rows]:
+    """Links with a row if contacts may push and pull so hard [N]."""
+    schemes: list[OneSolve] = []
+    make = OneSolve.__post_init__
+
+    def made(self: OneSolve) -> None:
+        make(self)
+        schemes.append(self)
+
+    monkeypatch.setattr(OneSolve, "__post_init__", made)
+    scene = load_scene("dc_twin", WORDS)
+    problem = problem_of(scene)
+    with March(MPI.COMM_SELF, *line_at_rest(problem, mesh_of(scene))):
+        (scheme,) = schemes
+        scheme.begin(DT)
+        respond = scheme.interaction.responder(scheme.share.share)
+
+        def found(push: tuple[float, float], pull: float) -> list[int]:
+            bounds = scheme.share.bounds
+            bounds.push[:], bounds.pull[:], bounds.loss[:] = push, pull, 1e-6
+            respond()
+            return sorted(scheme.share.links.tolist())
+
+        yield found
+
+
+def least(has_rows: Callable[[float], bool]) -> float:
+    """The least force [N] with which there are rows, to a thousandth."""
+    low, high = 0.0, 1e6
+    assert not has_rows(low) and has_rows(high)
+    while high - low > 1e-3 * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if has_rows(middle) else (middle, high)
+    return high
+
+
+def test_contacts_that_push_at_once_are_added_up(rows: Rows) -> None:
+    """Of two at one place each needs half of what one alone needs to slacken a dropper."""
+    alone = least(lambda force: bool(rows((force, 0.0), 0.0)))
+    together = least(lambda force: bool(rows((force, force), 0.0)))
+    assert together == pytest.approx(0.5 * alone, rel=2e-3)
+    assert rows((alone, alone), 0.0) == rows((2.0 * alone, 0.0), 0.0)
+
+
+def test_contacts_that_pull_slacken_other_droppers(rows: Rows) -> None:
+    pushed, pulled = rows((1e6, 0.0), 0.0), rows((0.0, 0.0), 1e6)
+    assert pushed and pulled and not set(pushed) & set(pulled)
+    assert rows((1e6, 0.0), 1e6) == sorted(pushed + pulled)
+
+
+# --- zeros on Merrill's path of simplices, of maps whose zeros are known otherwise ----------------
+
+
+SMALL = 1e-11
+
+
+def find_zero(
+    of: Callable[[np.ndarray], np.ndarray], start: np.ndarray, width: float
+) -> tuple[np.ndarray, bool]:
+    """The last place looked at, and whether it is a zero."""
+    at = start.copy()
+    return at, native.find_zero(of, at, width, SMALL, native.Room(2 * start.size))
+
+
+def faces(matrix: np.ndarray, right: np.ndarray) -> list[np.ndarray]:
+    """All s in the unit cube with F = matrix s + right: F >= 0 where s = 0, <= 0 where s = 1, and 0
+    between; every face of the cube is tried."""
+    n, found = right.size, []
+    for face in itertools.product((0.0, 1.0, None), repeat=n):
+        s = np.array([0.0 if at is None else at for at in face])
+        inside = np.array([at is None for at in face])
+        if inside.any():
+            own = matrix[np.ix_(inside, inside)]
+            s[inside] = np.linalg.solve(own, -(right + matrix @ s)[inside])
+        force = matrix @ s + right
+        between = ((s > 0.0) & (s < 1.0))[inside].all()
+        if between and (force[~inside & (s == 0.0)] >= 0.0).all():
+            if (force[~inside & (s == 1.0)] <= 0.0).all():
+                found.append(s)
+    return found
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1), n=st.integers(1, 4), turning=st.sampled_from([0.0, 1.0, 5.0])
+)
+@settings(max_examples=100, deadline=None)
+def test_the_variational_inequality_of_any_matrix_is_solved(
+    seed: int, n: int, turning: float
+) -> None:
+    """Also of matrices that turn, on which going from component to component runs in circles."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, n))
+    matrix, right = rng.normal(size=(n, n)) + turning * (root - root.T), rng.normal(size=n)
+
+    def normal(z: np.ndarray) -> np.ndarray:
+        share = np.clip(z, 0.0, 1.0)
+        return matrix @ share + right + z - share
+
+    z, found = find_zero(normal, np.full(n, 0.5), 0.25)
+    assert found
+    assert np.abs(normal(z)).max() <= SMALL
+    # Shares are as far from a solution as the worst condition of a face makes of SMALL.
+    known = faces(matrix, right)
+    assert min(np.abs(np.clip(z, 0.0, 1.0) - s).max() for s in known) < 1e6 * SMALL
+
+
+def test_a_smooth_map_is_solved_and_its_path_passes_other_zeros() -> None:
+    """Of z^3 - z the path may end at any of three zeros, of z^3 - 3 z + 10 at the one there is."""
+    z, found = find_zero(lambda z: z**3 - z, np.array([0.3]), 0.1)
+    assert found and min(abs(z[0] - root) for root in (-1.0, 0.0, 1.0)) < SMALL
+    (root,) = (r.real for r in np.roots([1.0, 0.0, -3.0, 10.0]) if abs(r.imag) < 1e-9)
+    z, found = find_zero(lambda z: z**3 - 3.0 * z + 10.0, np.array([4.0]), 0.25)
+    assert found and z[0] == pytest.approx(root, abs=SMALL)
+
+
+def test_a_map_without_a_number_is_no_zero() -> None:
+    """Where it is no number, and where it is one at the start alone."""
+    for of in (
+        lambda z: np.full(2, np.nan),
+        lambda z: z + 1.0 if z[0] == 0.5 else np.full(2, np.nan),
+    ):
+        _, found = find_zero(of, np.array([0.5, 0.5]), 0.25)
+        assert not found
+
+
+def test_a_map_without_a_zero_has_none() -> None:
+    """That does not point back from afar: the path ends where nothing is left to go on with."""
+    _, found = find_zero(lambda z: np.array([1.0, 0.0]), np.array([0.3, 0.4]), 0.25)
+    assert not found
+
+
+def test_a_map_of_numbers_beyond_the_grid_is_no_zero() -> None:
+    """It jumps by 1e17: columns of a simplex are the same to round-off, and it has no next one."""
+    matrix = np.array([[1.0, 1.0], [-1.0, 1.0]])
+    _, found = find_zero(lambda z: 1e17 * np.sign(matrix @ z + 0.3), np.zeros(2), 0.25)
+    assert not found

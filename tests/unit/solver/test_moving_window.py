@@ -1,4 +1,4 @@
-"""Steps of a window that moves with the train against steps of the whole line."""
+"""Steps of a window that moves with the train, and its pieces of matrices."""
 
 from __future__ import annotations
 
@@ -11,20 +11,29 @@ from measuring import COMM, History, check, continued, start_march
 from scenes import load_scene
 from scenes import mesh_of as scene_mesh
 from scenes import problem_of as scene_problem
-from small_lines import ac_simple_line, mesh_of, numerics, problem_of, train
+from small_lines import WHOLE, ac_simple_line, mesh_of, numerics, problem_of, train
+from stitched_line import stitched_line
 
-from catenary import InputError
+from catenary import InputError, RunBroken
 from catenary.meshgen.line import DropperPlace
 from catenary.meshgen.mesh import LineMesh
 from catenary.meshgen.slowest_wave import slowest_wave_of
+from catenary.solver.linear import pieces, unit_responses
+from catenary.solver.model import matrices
+from catenary.solver.model.model import Block
 from catenary.solver.problem.defects import DropperBreak
 from catenary.solver.problem.ends import Fixed, Periodic
 from catenary.solver.problem.problem import BOUNDED, EXACT, Damping, Problem, WindowChoice
+from catenary.solver.statics.form_finding import find_form
 from catenary.solver.time_loop import compiled_steps
 from catenary.solver.time_loop import march as time_loop
 from catenary.solver.time_loop.views.observers import Observer, StepView
+from catenary.solver.window import moving_window
 from catenary.solver.window.choice import opens_window
 from catenary.solver.window.moving_columns import MovedStations, columns_of, widen
+
+# --- steps of a window that moves with the train against steps of the whole line ------------------
+
 
 LINE = ac_simple_line(12)
 SPEED, START = 70.0, 330.0
@@ -290,3 +299,192 @@ def test_a_window_that_cannot_be_is_refused(changed: dict[str, Any], ranks: int,
     with pytest.raises(InputError, match=f"window.mode is exact.*{says}"):
         opens_window(problem, ranks, True)
     assert COMM.size == 1
+
+
+# --- A long line whose matrices, factors and columns are made by pieces, as a window needs them ---
+
+
+SPANS = 60
+WINDOW = WindowChoice(BOUNDED, None, 2, 2, 1.0)
+# Forces are some 100 N; pieces differ from the whole by the order of sums.
+PIECES_ROUND_OFF = 1e-9
+
+
+def long_scene(seconds: float, line: Any = None, **changes: Any) -> tuple[Problem, Any]:
+    line = ac_simple_line(SPANS) if line is None else line
+    run = train(
+        SPEED,
+        START,
+        START + SPEED * seconds,
+        raise_time=0.2,
+    )
+    return replace(problem_of(line, train=run, **changes), window=WINDOW), mesh_of(line, 2)
+
+
+def histories(problem: Problem, mesh: Any) -> tuple[History, Any, list[tuple[float, float]]]:
+    march, _ = start_march(problem, mesh)
+    energies: list[tuple[float, float]] = []
+    history = History(
+        lambda view: energies.append(view.energies()) if view.step % 50 == 0 else None
+    )
+    with march:
+        outcome = march.run([history])
+    assert outcome.outcome == "done", outcome.outcome
+    return history, march._line.operators.in_pieces, energies  # noqa: SLF001
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pieces so small that a train comes across many of them."""
+    monkeypatch.setattr(pieces, "_SIZE", 32)
+    monkeypatch.setattr(moving_window, "_AROUND", 16)
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize(
+    ("seconds", "changes"),
+    [
+        pytest.param(5.0, {}, marks=pytest.mark.study),
+        (1.0, {"numerics": numerics(1e-3, integrator="hht", spectral_radius=0.8)}),
+        (1.0, {"damping": Damping(2e-3, 0.0, {"droppers": (1e-4, 0.0)})}),
+        (1.0, {"line": stitched_line(SPANS)}),
+    ],
+    ids=["newmark", "hht", "components", "station types"],
+)
+def test_pieces_give_what_the_whole_line_gives(
+    seconds: float, changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, mesh = long_scene(seconds, **changes)
+    found, operators, energies = histories(problem, mesh)
+    n_pieces, n_slots = operators.pieces.edges.size - 1, operators.pieces.n_slots
+    print(n_pieces, "pieces,", n_slots, "slots")
+    assert n_pieces > n_slots
+    monkeypatch.setattr(pieces.Pieces, "are_few", True)
+    whole, none, whole_energies = histories(problem, mesh)
+    assert none is None
+    for channel in ("contact_force", "head_height", "arm_uplift", "dropper_force"):
+        expected = whole[channel]
+        check(
+            channel,
+            found[channel],
+            expected,
+            within=PIECES_ROUND_OFF * np.abs(expected).max(),
+        )
+    largest = np.abs(whole_energies).max()
+    check(
+        "energies",
+        np.array(energies),
+        np.array(whole_energies),
+        within=PIECES_ROUND_OFF * largest,
+    )
+
+
+@pytest.mark.usefixtures("small")
+def test_a_march_in_pieces_goes_on_after_a_restart_as_if_nothing_had_happened() -> None:
+    problem, mesh = long_scene(3.0)
+    kept: list[Any] = []
+    energies: list[tuple[float, float]] = []
+
+    def look(view: Any) -> None:
+        if view.step == 2403:
+            kept.append(view.checkpoint())
+        if view.step >= 2403 and view.step % 20 == 0:
+            energies.append(view.energies())
+
+    whole, rest = History(look), History(look)
+    march, _ = start_march(problem, mesh)
+    with march:
+        march.run([whole])
+    first, energies = energies, []
+    again, _ = start_march(problem, mesh)
+    with again:
+        again.restore(kept[0])
+        again.run([rest])
+    assert np.array_equal(rest["contact_force"], whole["contact_force"][2403:])
+    assert len(first) == 30
+    check("energies", np.array(energies), np.array(first), within=1e-12 * np.abs(first).max())
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize(
+    ("margin", "goes_on"), [(0.85, True), pytest.param(0.5, False, marks=pytest.mark.study)]
+)
+def test_columns_that_reach_further_than_those_tried_are_borne_or_told(
+    margin: float, goes_on: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where spans differ, and the line answers further from some than from those tried.
+
+    Of windows that are 0.85 as wide as 1e-12 is felt some 1e-10 stands outside, of 0.5 some 1e-6.
+    """
+    problem, mesh = long_scene(1.0)
+    whole, _, _ = histories(problem, mesh)
+    monkeypatch.setattr(unit_responses, "_LONG", 1.0)
+    monkeypatch.setattr(unit_responses, "_MARGIN", margin)
+    if goes_on:
+        found, operators, _ = histories(problem, mesh)
+        assert operators is not None
+        expected = whole["contact_force"]
+        # Measured 1.2e-7, as links stand still in less of the ends of a window, too; that such a
+        # window has two spans to each side costs 1e-2.
+        check("force", found["contact_force"], expected, within=1e-6 * expected.max())
+        return
+    march, _ = start_march(problem, mesh)
+    with march:
+        outcome = march.run([])
+    assert "which a window cannot follow; set window.mode to off" in outcome.outcome
+
+
+@pytest.mark.usefixtures("small")
+def test_factors_of_pieces_must_be_finite() -> None:
+    _, operators, _ = histories(*long_scene(1.0))
+    factors, made = operators.factors, operators.pieces.first()
+    _, (rows,) = pieces.rows_on(operators._model, made, operators._coefficients)
+    broken = rows._replace(blocks=np.full_like(rows.blocks, np.nan))
+    with pytest.raises(RunBroken, match="singular or not finite"):
+        factors.make(made, broken)
+
+
+# --- parts of a line's matrices, put together by stretches ----------------------------------------
+
+
+@pytest.mark.parametrize("rows", [(0, None), (36, 400), (36, 36)])
+def test_stretches_make_the_matrix_to_the_bit(
+    rows: tuple[int, int | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, _ = find_form(problem_of(ac_simple_line(3), WHOLE), mesh_of(ac_simple_line(3), 3))
+    width, n = model.numbering.width, model.n_dofs
+    here = rows[0], n if rows[1] is None else rows[1]
+    asked = model, here, (0, n), (1.0, 0.3, 0.2), 1.0, width
+    whole = matrices.part_of(*asked)
+    monkeypatch.setattr(matrices, "_STRETCH", 10 * width + 1)
+    parts = matrices.part_of(*asked)
+    assert parts.shape == whole.shape == (here[1] - here[0], n)
+    assert parts.blocksize == whole.blocksize == (width, width)
+    for name in ("data", "indices", "indptr"):
+        assert np.array_equal(getattr(parts, name), getattr(whole, name)), name
+
+
+# --- elements of a block that are near a range of unknowns, whatever their order ------------------
+
+
+N = 101  # no multiple of what is looked for together
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+def test_all_elements_of_a_range_are_among_those_near(ordered: bool) -> None:
+    first = 2 * np.arange(N)
+    dofs = first[:, None] + np.arange(4)
+    if not ordered:
+        dofs = dofs[np.random.default_rng(3).permutation(N)]
+    block = Block("wire", dofs, np.arange(N), None, None)
+    for low, high in ((0, 4), (60, 61), (100, 180), (200, 204), (0, 204)):
+        found = np.arange(N)[block.near(low, high)]
+        inside = np.flatnonzero(((dofs >= low) & (dofs < high)).any(axis=1))
+        assert np.isin(inside, found).all()
+        if ordered:  # and few others, in order
+            assert (np.diff(found) == 1).all() and found.size <= inside.size + 32
+
+
+def test_a_block_without_elements_has_none_near() -> None:
+    block = Block("wire", np.zeros((0, 4), dtype=np.int64), np.zeros(0, int), None, None)
+    assert np.arange(0)[block.near(0, 10)].size == 0
