@@ -16,7 +16,7 @@ import catenary
 pytestmark = pytest.mark.timeout(250)
 
 COMM = MPI.COMM_WORLD
-# Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see test_same_answers.py.
+# Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see rank_histories.py.
 SAME = 1e-9
 
 

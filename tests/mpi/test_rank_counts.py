@@ -6,22 +6,12 @@ fewer ranks the counts that these allow are compared.
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
 import pytest
 from mpi4py import MPI
-from rank_histories import Histories, relative
-from scenes import load_scene, mesh_of, problem_of
+from rank_histories import WORLD, check_off, marched, on_one, rest_on_all
+from scenes import load_scene
 
-from catenary.base.parallel import on_root
-from catenary.solver.statics.line_at_rest import LineAtRest, line_at_rest_on_all
-from catenary.solver.time_loop.march import March
-
-WORLD = MPI.COMM_WORLD
 COUNTS = (2, 3, 5, 8)
-# As in `test_same_answers`.
-TOLERANCE = 1e-9
 N_SPANS = 10
 STEPS, DT = 80, 2e-3
 
@@ -102,14 +92,6 @@ def _anchors(middle: float, span: float) -> str:
     return f"line.mid_points_m=[{middle - 3 * span},{middle + 3 * span}]"
 
 
-def histories(comm: Any, rest: LineAtRest) -> dict[str, np.ndarray] | None:
-    """Forces of contacts and droppers and uplifts of arms on rank 0 of ``comm``. Collective."""
-    seen = Histories(comm)
-    with March(comm, *rest) as march:
-        march.run([seen])
-    return seen.joined()
-
-
 def test_scenes_are_accepted() -> None:
     """Also where ranks are too few to compare what they give."""
     for topology, plane in CHOSEN if WORLD.rank == 0 else ():
@@ -119,20 +101,10 @@ def test_scenes_are_accepted() -> None:
 @pytest.mark.study
 @pytest.mark.parametrize(("topology", "plane"), CHOSEN)
 def test_any_number_of_ranks_gives_the_answer_of_one(topology: str, plane: str) -> None:
-    scene = on_root(WORLD, lambda: load_scene(*words_of(topology, plane)))
-    problem, mesh = problem_of(scene), on_root(WORLD, lambda: mesh_of(scene))
-    rest = line_at_rest_on_all(problem, mesh, WORLD)
-    alone = on_root(WORLD, lambda: histories(MPI.COMM_SELF, rest), takes_long=True)
+    rest = rest_on_all(*words_of(topology, plane))
+    alone = on_one(lambda comm: marched(comm, rest))
     for count in (count for count in COUNTS if count <= WORLD.size):
         group = WORLD.Split(0 if WORLD.rank < count else MPI.UNDEFINED)
-        found: dict[str, float] = {}
         if group != MPI.COMM_NULL:
-            together = histories(group, rest)
-            if together is not None:
-                found = {name: relative(together[name], alone[name]) for name in together}
+            check_off(group, marched(group, rest), alone)
             group.Free()
-        found = WORLD.bcast(found)
-        if WORLD.rank == 0:
-            print(f"{topology}, {plane}: {count} ranks {max(found.values()):.1e}")
-        assert set(found) == {"force", "arms", "droppers"}
-        assert max(found.values()) < TOLERANCE

@@ -25,7 +25,7 @@ VARIANTS = (
     Variant("slack", ("line.dropper.pre_sag_mid_mm=-100",)),
     Variant("sound", ()),
 )
-# Round-off of the parallel solve, as in test_same_answers.py.
+# Round-off of the parallel solve, as in rank_histories.py.
 TOLERANCE = 1e-9
 
 

@@ -75,7 +75,7 @@ QUANTITIES = {
     "loss_of_contact": "loss_percent",
 }
 # A run that repeats the same operations on another processor or with another BLAS differs by
-# round-off, 1e-10 at most (tests/mpi/test_same_answers.py); the figures are filtered means.
+# round-off, 1e-10 at most (tests/support/rank_histories.py); the figures are filtered means.
 GOLDEN = 1e-6
 # benchmarks of ten codes: dropper lengths within 5 mm of the nominal ones.
 LENGTH = 5e-3

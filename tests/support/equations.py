@@ -24,13 +24,15 @@ class Residual(Observer):
         M a + C v + K u + sum of s L - sum of f N,    s = T - T' + (1 - r) max(0, -T)
 
     in terms of the largest sum of the terms' sizes. T is a dropper's tension as if it could push,
-    by its curve and with its damping, T' that by its slope at rest; f are the recorded contact
-    forces.
+    by its curve and with that of its damping which goes with the spring, T' that by its slope at
+    rest; f are the recorded contact forces. ``shown_off`` is what droppers' forces are off by
+    [N], and ``n_slack`` how often one was slack.
     """
 
     def __init__(self, rest: LineAtRest) -> None:
         model = rest.model
-        self.largest = 0.0
+        self.largest = self.shown_off = 0.0
+        self.n_slack = 0
         self._wires = ContactWires(model, rest.form, distribute(model, 1, 0))
         self._matrices = tuple(
             whole_matrix(model, **{name: 1.0}) for name in ("stiffness", "damping", "mass")
@@ -38,6 +40,10 @@ class Residual(Observer):
         self._ends = model.dofs(model.mesh.droppers)
         self._tension = rest.form.dropper_force
         self._stiffness, self._damping = model.dropper_stiffness, model.dropper_damping
+        if rest.problem.slack_dampers_act:
+            # Of their damping only what was added for the numbers' sake goes with the spring.
+            added = model.released_damping if model.simulated.added_alpha else 0.0
+            self._damping = np.broadcast_to(added, self._stiffness.shape)
         slackens = "dropper_slackening" in rest.problem.effects
         self._released = 1.0 - model.simulated.kept_ratio if slackens else 0.0
         self._curves = model.dropper_slopes if slackens and model.droppers_bend else None
@@ -63,6 +69,9 @@ class Residual(Observer):
             at = self._curves.stretch_under(self._tension) + spread
             own = self._curves.force_at(at + self._damping / self._stiffness * rate)
             slack = own - tension + self._released * np.maximum(0.0, -own)
+        off = np.abs(tension + slack - view.dropper_force).max(initial=0.0)
+        self.shown_off = max(self.shown_off, off)
+        self.n_slack += np.count_nonzero(tension + slack <= 0.0)
         np.add.at(left, self._ends[:, 0], slack)
         np.subtract.at(left, self._ends[:, 1], slack)
         n = self._wires.n_wires

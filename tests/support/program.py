@@ -52,7 +52,7 @@ SHORT_SCENE = (
     "evaluation.to_m=240",
     "output.energy_every_s=0.02",
 )
-# Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see tests/mpi/test_same_answers.py.
+# Round-off of a solve, 1e-16, over 1e4 steps of a damped line; see tests/support/rank_histories.py.
 SAME = 1e-9
 # The program as a script of Python.
 ENTRY = "from catenary.cases.cli.main import main; main()"

@@ -361,20 +361,6 @@ def test_a_curve_of_one_slope_is_an_axial_stiffness_bit_for_bit() -> None:
         assert np.array_equal(found[0][channel], found[1][channel])
 
 
-def test_points_on_a_straight_line_change_nothing() -> None:
-    """They only move the bend of slackness away from the piece at rest, into a row of its own."""
-    straight = ((0.0, 0.0), (5e-3, 250.0))
-    with_points = ((0.0, 0.0), (1e-3, 50.0), (2e-3, 100.0), (5e-3, 250.0))
-    one, other = (
-        march(problem_on(line_of(curve)), mesh_of(line_of(curve), 2))
-        for curve in (straight, with_points)
-    )
-    assert (one["dropper_force"] == 0.0).any()
-    # Slopes of points differ by round-off, which forces of some 1e3 N have in each of 350 steps.
-    check("contact force [N]", other["contact_force"], one["contact_force"], within=1e-7)
-    check("dropper forces [N]", other["dropper_force"], one["dropper_force"], within=1e-7)
-
-
 def test_without_slackening_droppers_keep_the_slope_that_they_have_at_rest() -> None:
     """All is linear then, as studies of stability need it: each more force adds the same."""
     problem, mesh, _, _ = at_rest("softening")

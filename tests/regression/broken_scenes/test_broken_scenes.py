@@ -259,6 +259,50 @@ ASSIGNMENTS = {
     "unknown edition": (["evaluation.edition=1999"], "must be one of 2006, 2012, 2020"),
     "unknown edition as text": (['evaluation.edition="1999"'], "must be one of"),
     "unknown system": (["evaluation.system=steam"], "must be one of"),
+    # Contact laws, schemes and steps.
+    "no contact stiffness": (["contact.stiffness_N_per_m=0"], "greater than 0 [N/m]"),
+    "step above 20 Hz": (["numerics.dt_s=0.03"], "20 Hz"),
+    "step of nothing": (["numerics.dt_s=0"], "at least 1e-06 [s]"),
+    "unknown scheme": (["numerics.scheme=newton"], "one_solve or fixed_point"),
+    "unstable Newmark": (["numerics.newmark_gamma=0.7"], "2 newmark_beta >= newmark_gamma"),
+    "unknown integrator": (["numerics.integrator=rk4"], "newmark, hht or generalized_alpha"),
+    "spectral radius of Newmark": (
+        ["numerics.spectral_radius=0.8"],
+        "must not have spectral_radius with integrator newmark",
+    ),
+    "no spectral radius": (
+        ["numerics.integrator=generalized_alpha"],
+        "must give spectral_radius with integrator generalized_alpha",
+    ),
+    "spectral radius above 1": (
+        ["numerics.integrator=generalized_alpha", "numerics.spectral_radius=1.1"],
+        "at most 1",
+    ),
+    "spectral radius below HHT's": (
+        ["numerics.integrator=hht", "numerics.spectral_radius=0.4"],
+        "from 0.5 to 1 with integrator hht",
+    ),
+    "two ways to damp": (
+        [
+            "numerics.integrator=hht",
+            "numerics.spectral_radius=0.8",
+            "numerics.newmark_gamma=0.55",
+            "numerics.newmark_beta=0.28",
+        ],
+        "must not have newmark_beta and newmark_gamma with integrator",
+    ),
+    "kinematic contact by another method": (
+        [
+            "contact.law=kinematic",
+            "contact.stiffness_N_per_m=",
+            "numerics.integrator=generalized_alpha",
+            "numerics.spectral_radius=0.5",
+        ],
+        "only if one method steps both: take newmark",
+    ),
+    "negative Newmark damping": (["numerics.newmark_gamma=0.4"], "at least 0.5"),
+    "no iterations": (["numerics.max_iterations=0"], "at least 1"),
+    # Options of PETSc, and the table of tests.
     "list for a PETSc option": (["petsc.march_ksp_type=[1]"], "must be preonly, richardson"),
     "PETSc option with its dash": (["petsc.-march_ksp_type=cg"], "mean petsc.march_ksp_type?"),
     "unknown key in the test table": (["test.train.sped_km_h=3"], "did you mean train.speed_km_h?"),

@@ -1,2 +1,0 @@
-SystemCall "touch canary";
-Point(1) = {0, 0, 0};
