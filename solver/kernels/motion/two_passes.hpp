@@ -5,7 +5,7 @@
 
 #include "motion/motion.hpp"
 #include "motion/window.hpp"
-#include "stations/records.hpp"
+#include "stations/line.hpp"
 
 namespace catenary {
 

@@ -47,8 +47,9 @@ void offer_contact(py::module_& module) {
     offer(module, "heights", heights, "n=n, n, n");
     offer(module, "find_across", find_across, "");
     offer(module, "respond", respond, "n=n, n=n");
-    offer(module, "superpose", superpose, "n=n, n");
-    offer(module, "compensate", compensate, "*, k, k");
+    offer<void, const Contacts&, std::span<const double>>(module, "superpose", superpose, "n=n, n");
+    offer<void, const Contacts&, std::span<const int64_t>, std::span<const double>>(
+        module, "compensate", compensate, "*, k, k");
     offer(module, "begin_work", begin_work, "");
     offer(module, "add_work", add_work, "n=n, n");
     offer(module, "move_contacts", move_contacts, "");
