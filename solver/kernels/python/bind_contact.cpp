@@ -60,8 +60,7 @@ void offer_contact(py::module_& module) {
     offer(module, "slack_under", slack_under, "w=3n+2, *, *, n");
     offer(module, "under", under, "n=n, w=3n+2 m=m.., n, m, n=n");
     offer(module, "leaves_out", leaves_out, "n, m, w=3n+2, n=n, *");
-    offer<Solved, const SmallProblem&, const std::optional<MarchedHertzLaw>&>(module, "solve",
-                                                                              solve, "n=n, n=n");
+    offer(module, "solve", solve, "n=n, n=n");
     offer(module, "find_solution", find_solution, "m=m, m=m");
     offer(module, "find_zero", find_zero_of, "");
     module.attr("MOST_TANGENTS") = kMostTangents;
