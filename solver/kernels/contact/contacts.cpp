@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/curves.hpp"
 #include "base/targets.hpp"
 
 namespace catenary {
@@ -200,6 +201,15 @@ void locate_one(double place, const Wires& wires, Touch& touch) {
     if (!wires.surface.empty()) find_surface(place, wires.surface, touch);
 }
 
+/// This rank's share of the velocity of a place on a wire [m/s].
+double velocity_of(std::span<const int64_t, 4> local, std::span<const double, 4> value,
+                   const Motion& motion) {
+    double total = 0.0;
+    if (motion.x.empty()) return total;
+    for (int k = 0; k < 4; ++k) total += value[k] * velocity_at(local[k], motion);
+    return total;
+}
+
 }  // namespace
 
 void locate(std::span<const double> x, const Wires& wires, std::span<Touch> touches) {
@@ -271,19 +281,6 @@ void find_across(const Contacts& contacts) {
         contacts.across.moved[i] = moved;
     }
 }
-
-namespace {
-
-/// This rank's share of the velocity of a place on a wire [m/s].
-double velocity_of(std::span<const int64_t, 4> local, std::span<const double, 4> value,
-                   const Motion& motion) {
-    double total = 0.0;
-    if (motion.x.empty()) return total;
-    for (int k = 0; k < 4; ++k) total += value[k] * velocity_at(local[k], motion);
-    return total;
-}
-
-}  // namespace
 
 void superpose(const Contacts& contacts, std::span<const double> force) {
     superpose(contacts, {force.data(), size(force), 1}, contacts.motion);
@@ -375,28 +372,15 @@ void write_outputs(const TrainOutputs& outputs, std::span<const double> force,
     }
 }
 
-namespace {
-
-/// How far the contact of raked strip i is ahead of its middle [m].
-double lead_of(const Leads& leads, int64_t i, double middle) {
-    const auto middles = part(leads.middle, leads.first[i], leads.first[i + 1]);
-    const auto own = part(leads.lead, leads.first[i], leads.first[i + 1]);
-    if (middle >= middles.back()) return own.back();
-    const int64_t beyond = std::ranges::upper_bound(middles, middle) - middles.begin();
-    if (beyond == 0) return own[0];
-    const double before = middles[beyond - 1];
-    const double share = (middle - before) / (middles[beyond] - before);
-    return own[beyond - 1] + share * (own[beyond] - own[beyond - 1]);
-}
-
-}  // namespace
-
 void move_contacts(const TrainPlaces& places, double way) {
     for (size_t i = 0; i < places.start.size(); ++i) places.now[i] = places.start[i] + way;
     const Leads& leads = places.leads;
     for (int64_t i = 0; i < size(leads.contact); ++i) {
         double& here = places.now[leads.contact[i]];
-        here += lead_of(leads, i, here);
+        const auto of = [&](std::span<const double> all) {
+            return part(all, leads.first[i], leads.first[i + 1]);
+        };
+        here += line_at(of(leads.middle), of(leads.lead), here).first;
     }
 }
 
