@@ -166,7 +166,7 @@ class GustField:
             )
             steps = np.diff(self._points[first : stop + 1])
             ends = self._posts[post], self._posts[post + 1]
-            native.bridge(*ends, self._rates, steps, normals, values[1:])
+            values[1:] = _bridge(*ends, self._rates, steps, normals)
         if stop == self._points.size - 1 and stop < (post + 1) * POSTS and stop > first:
             values = np.concatenate([values, self._posts[post + 1][None]])
         made = np.ascontiguousarray(values.T * np.tile(self._raised, 2)[:, None])
@@ -174,6 +174,26 @@ class GustField:
         if len(self._kept) > _KEPT:
             self._kept.popitem(last=False)
         return made
+
+
+def _bridge(
+    first: np.ndarray, last: np.ndarray, rates: np.ndarray, steps: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
+    """Values (m, k) at m points between two posts of k first-order Gauss-Markov processes.
+
+    They are ``first`` and ``last`` (k,) at the posts and decay as exp(-rate d), ``rates`` in 1/m;
+    ``steps`` (m + 1,) are from the first post to the point after it, and so on to the last post
+    [m]; ``normals`` (m, k) standard normal numbers.
+    """
+    near = np.multiply.outer(steps[:-1], rates)
+    far = np.multiply.outer(steps.sum() - np.cumsum(steps[:-1]), rates)
+    lost_near, lost_far, lost = (-np.expm1(-2.0 * decay) for decay in (near, far, near + far))
+    values = np.exp(-far) * lost_near / lost * last
+    values += np.sqrt(lost_near * lost_far / lost) * normals
+    kept = np.exp(-near) * lost_far / lost
+    for before, value, share in zip([first, *values[:-1]], values, kept, strict=True):
+        value += share * before
+    return np.asarray(values)
 
 
 def narrowed(half: np.ndarray) -> np.ndarray:

@@ -31,7 +31,7 @@ _SAMPLES = 200
 _FEWEST, _WANTED = 4, 22.0
 # Rate of fading below which the ends of a window are damped on mass [1/s], and by how much, in wave
 # speeds times spans: the change of group velocity with wavenumber, some 0.08 of that, is a scale of
-# 2 of it (`fade` in `kernels/motion/window.cpp`). Without that damping more spans are taken.
+# 2 of it (`fade` in `kernels/motion/two_passes.cpp`). Without that damping more spans are taken.
 _SLOW, _FADING, _WANTED_WITHOUT = 0.1, 2.0, 30.0
 # Spans beyond the front of the fastest transverse wave within which motion is found. Bending makes
 # short waves faster, damping ends them: in exact windows on en50318_2002 and ambrosio2012 (200

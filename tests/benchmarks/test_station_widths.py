@@ -17,9 +17,8 @@ from mpi4py import MPI
 from repeating_line import layout, line, station_factors, station_product
 from scenes import load_scene, mesh_of, problem_of
 
-from catenary.solver.integrators.line_integrator import StationPasses
+from catenary.solver.integrators.line_integrator import StationPasses, make_line
 from catenary.solver.integrators.line_state import PredictedLineState, StepFactors
-from catenary.solver.integrators.make_line import NewmarkLine
 from catenary.solver.kernels import aligned_arrays
 from catenary.solver.linear.step_operators import ByStations
 from catenary.solver.model.partition import distribute
@@ -73,7 +72,7 @@ def times() -> dict[str, float]:
     scene = load_scene("ambrosio2012", [])
     problem = problem_of(scene)
     model, _ = find_form(problem, mesh_of(scene))
-    whole = NewmarkLine(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
+    whole = make_line(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
     calls: dict[str, Callable] = {name: make(whole, model) for name, make in LIBRARIES.items()}
     calls["product"] = whole.internal_forces
     calls |= {str(widths): passes(widths) for widths in MOST}

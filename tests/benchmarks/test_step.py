@@ -21,7 +21,7 @@ from scenes import load_scene, mesh_of, problem_of
 
 from catenary.cases.run.runner import run_case
 from catenary.postproc.read.results import Results
-from catenary.solver.integrators.make_line import NewmarkLine
+from catenary.solver.integrators.line_integrator import LineIntegrator, make_line
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.statics.line_at_rest import line_at_rest
@@ -79,7 +79,7 @@ def keep_walls(name: str, benchmark: Any, walls: list[float]) -> None:
     benchmark.extra_info["us_per_step"], benchmark.extra_info["us_half"] = _found[name]
 
 
-PARTS: dict[str, Callable[[NewmarkLine, Model], Callable]] = {
+PARTS: dict[str, Callable[[LineIntegrator, Model], Callable]] = {
     **LIBRARIES,
     OWN: lambda line, model: line.solve,
     PRODUCT: lambda line, model: line.internal_forces,
@@ -89,7 +89,7 @@ PARTS: dict[str, Callable[[NewmarkLine, Model], Callable]] = {
 @pytest.mark.parametrize("part", PARTS)
 def test_parts_of_the_floor(benchmark: Any, at_rest: tuple[Any, ...], part: str) -> None:
     problem, model, _, _ = at_rest
-    line = NewmarkLine(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
+    line = make_line(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
     call = PARTS[part](line, model)
 
     def repeat() -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import ast
 import functools
 import graphlib
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -366,6 +369,15 @@ def test_no_files_import_each_other_in_a_circle_even_for_types() -> None:
     }
     assert sum(map(len, arrows.values())) > len(FILES)
     graphlib.TopologicalSorter(arrows).prepare()  # names a circle that it finds
+
+
+@pytest.mark.process
+def test_benchmarks_can_be_collected() -> None:
+    """No other run of tests imports them."""
+    words = [sys.executable, "-m", "pytest", "--collect-only", "-q", "tests/benchmarks"]
+    own = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    found = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, env=own)
+    assert found.returncode == 0, found.stdout
 
 
 def test_the_architecture_page_lists_folders_within_rooms() -> None:

@@ -18,25 +18,25 @@ int64_t piece_at(std::span<const double> breaks, double x) {
     return std::min(std::max<int64_t>(before(breaks, x), 0), size(breaks) - 2);
 }
 
+/// A cubic by its coefficients, the highest power first.
+Derivatives cubic_at(std::span<const double> c, double d) {
+    return {((c[0] * d + c[1]) * d + c[2]) * d + c[3], (3.0 * c[0] * d + 2.0 * c[1]) * d + c[2],
+            6.0 * c[0] * d + 2.0 * c[1]};
+}
+
 }  // namespace
 
 Derivatives spline_at(std::span<const double> breaks, Array2<const double> coefficients, double x) {
     const int64_t i = piece_at(breaks, x);
-    const double d = x - breaks[i];
-    const auto c = coefficients[i];
-    return {((c[0] * d + c[1]) * d + c[2]) * d + c[3], (3.0 * c[0] * d + 2.0 * c[1]) * d + c[2],
-            6.0 * c[0] * d + 2.0 * c[1]};
+    return cubic_at(coefficients[i], x - breaks[i]);
 }
 
 void tables_at(const SplineTables& tables, double x, std::span<double> values,
                std::span<double> slopes) {
     const int64_t i = piece_at(tables.breaks, x);
-    const double d = x - tables.breaks[i];
-    for (int64_t k = 0; k < size(values); ++k) {
-        const auto c = tables.coefficients[i][k];
-        values[k] = ((c[0] * d + c[1]) * d + c[2]) * d + c[3];
-        slopes[k] = (3.0 * c[0] * d + 2.0 * c[1]) * d + c[2];
-    }
+    for (int64_t k = 0; k < size(values); ++k)
+        std::tie(values[k], slopes[k], std::ignore) =
+            cubic_at(tables.coefficients[i][k], x - tables.breaks[i]);
 }
 
 Derivatives sines_at(std::span<const double> amplitudes, std::span<const double> rates,
@@ -52,22 +52,20 @@ Derivatives sines_at(std::span<const double> amplitudes, std::span<const double>
     return {value, first, second};
 }
 
+std::pair<double, double> line_at(std::span<const double> x, std::span<const double> y,
+                                  double place) {
+    const int64_t i = before(x, place);
+    if (i < 0) return {y.front(), 0.0};
+    if (i > size(x) - 2) return {y.back(), 0.0};
+    const double slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+    return {y[i] + slope * (place - x[i]), slope};
+}
+
 void polyline_at(std::span<const double> x, std::span<const double> y,
                  std::span<const double> places, std::span<double> values,
                  std::span<double> slopes) {
-    for (int64_t j = 0; j < size(places); ++j) {
-        const int64_t i = before(x, places[j]);
-        if (i < 0) {
-            values[j] = y.front();
-            slopes[j] = 0.0;
-        } else if (i > size(x) - 2) {
-            values[j] = y.back();
-            slopes[j] = 0.0;
-        } else {
-            slopes[j] = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
-            values[j] = y[i] + slopes[j] * (places[j] - x[i]);
-        }
-    }
+    for (int64_t j = 0; j < size(places); ++j)
+        std::tie(values[j], slopes[j]) = line_at(x, y, places[j]);
 }
 
 }  // namespace catenary

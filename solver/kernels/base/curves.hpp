@@ -2,6 +2,7 @@
 // Curves with their derivatives: splines, sums of sines, polylines. Splines are extrapolated beyond
 // their ends.
 #include <tuple>
+#include <utility>
 
 #include "base/arrays.hpp"
 
@@ -29,8 +30,10 @@ void tables_at(const SplineTables& tables, double x, std::span<double> values,
 Derivatives sines_at(std::span<const double> amplitudes, std::span<const double> rates,
                      std::span<const double> phases, double x);
 
-/// Fill in values and slopes (s,) at places of the line through points (x, y); level beyond its
-/// ends.
+/// Value and slope at a place of the line through points (x, y); level beyond its ends.
+std::pair<double, double> line_at(std::span<const double> x, std::span<const double> y,
+                                  double place);
+/// Fill in both (s,) at places.
 void polyline_at(std::span<const double> x, std::span<const double> y,
                  std::span<const double> places, std::span<double> values,
                  std::span<double> slopes);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/curves.hpp"
 #include "base/targets.hpp"
 
 namespace catenary {
@@ -38,31 +39,6 @@ CATENARY_FOR_TARGETS
 void add_one(double* __restrict answer, int64_t n, Pair one) {
     for (int64_t j = 0; j < n; ++j)
         answer[j] += one.height * one.by_height[j] + one.slope * one.by_slope[j];
-}
-
-CATENARY_FOR_TARGETS
-void add_to_motion(double force, const double* __restrict answer, int64_t n, double* __restrict x,
-                   double* __restrict y, double* __restrict z, const double* gains) {
-    const double to_x = gains[0], to_y = gains[1], to_z = gains[2];
-    for (int64_t j = 0; j < n; ++j) {
-        const double change = force * answer[j];
-        z[j] += to_z * change;
-        x[j] += to_x * change;
-        y[j] += to_y * change;
-    }
-}
-
-/// The same for one scene in lanes: its numbers are `spacing` apart.
-void add_to_lane(double force, const double* __restrict answer, int64_t n, int64_t spacing,
-                 double* __restrict x, double* __restrict y, double* __restrict z,
-                 const double* gains) {
-    const double to_x = gains[0], to_y = gains[1], to_z = gains[2];
-    for (int64_t j = 0, at = 0; j < n; ++j, at += spacing) {
-        const double change = force * answer[j];
-        z[at] += to_z * change;
-        x[at] += to_x * change;
-        y[at] += to_y * change;
-    }
 }
 
 /// Make the numbers from `low` to `high` zero, if there are any.
@@ -106,19 +82,54 @@ void put_columns(const Node* nodes, std::span<const double> data, const double (
     filled[1] = end;
 }
 
-/// Add the answer to a force [N], of the unknowns from `begin` on, to the motion.
-void add_answer(double force, std::span<const double> answer, int64_t begin, const Motion& motion,
-                std::span<const double> gains) {
+/// Add the answer to a force [N] to a motion whose numbers are `spacing` apart.
+[[gnu::always_inline]] inline void add_to_motion(double force, const double* __restrict answer,
+                                                 int64_t n, int64_t spacing, double* __restrict x,
+                                                 double* __restrict y, double* __restrict z,
+                                                 const double* gains) {
+    const double to_x = gains[0], to_y = gains[1], to_z = gains[2];
+    for (int64_t j = 0, at = 0; j < n; ++j, at += spacing) {
+        const double change = force * answer[j];
+        z[at] += to_z * change;
+        x[at] += to_x * change;
+        y[at] += to_y * change;
+    }
+}
+
+/// Add the answer to a force in each of L lanes [N] to motions side by side.
+template <int64_t L>
+[[gnu::always_inline]] inline void add_to_motions(const double* forces, double sign,
+                                                  const double* answer, int64_t n, double* x,
+                                                  double* y, double* z, const double* gains) {
+    using Lanes = SideBySide<L>;
+    const typename Lanes::Numbers force = sign * Lanes::at(forces), to_x = gains[0] * force,
+                                  to_y = gains[1] * force, to_z = gains[2] * force;
+    for (int64_t j = 0; j < n; ++j) {
+        Lanes::at(x + L * j) += to_x * answer[j];
+        Lanes::at(y + L * j) += to_y * answer[j];
+        Lanes::at(z + L * j) += to_z * answer[j];
+    }
+}
+
+/// Add the answer to forces [N], of the unknowns from `begin` on, to the motion: to a force in each
+/// lane, or to one in the first of them.
+CATENARY_FOR_TARGETS
+void add_answer(std::span<const double> forces, double sign, std::span<const double> answer,
+                int64_t begin, const Motion& motion, std::span<const double> gains) {
     const int64_t n = size(answer), spacing = motion.spacing;
-    if (n == 0) return;
+    if (n == 0 || std::ranges::all_of(forces, [](double force) { return force == 0.0; })) return;
     const auto of = [&](std::span<double> all) {
-        return part(all, begin * spacing, (begin + n - 1) * spacing + 1).data();
+        return part(all, begin * spacing, (begin + n - 1) * spacing + size(forces)).data();
     };
     double *const x = of(motion.x), *const y = of(motion.y), *const z = of(motion.z);
-    if (spacing == 1)
-        add_to_motion(force, answer.data(), n, x, y, z, gains.data());
+    if (size(forces) > 1)
+        with_lanes(spacing, [&](auto lanes) __attribute__((always_inline)) {
+            add_to_motions<lanes>(forces.data(), sign, answer.data(), n, x, y, z, gains.data());
+        });
+    else if (spacing > 1)
+        add_to_motion(sign * forces[0], answer.data(), n, spacing, x, y, z, gains.data());
     else
-        add_to_lane(force, answer.data(), n, spacing, x, y, z, gains.data());
+        add_to_motion(sign * forces[0], answer.data(), n, 1, x, y, z, gains.data());
 }
 
 /// Hermite functions N at `xi` in [0, 1] of an element's `length` [m]: w(x) = sum of N times
@@ -188,6 +199,15 @@ void locate_one(double place, const Wires& wires, Touch& touch) {
         touch.slope[k] = touch.whole_slope[k] * node.owned[k % 2];
     }
     if (!wires.surface.empty()) find_surface(place, wires.surface, touch);
+}
+
+/// This rank's share of the velocity of a place on a wire [m/s].
+double velocity_of(std::span<const int64_t, 4> local, std::span<const double, 4> value,
+                   const Motion& motion) {
+    double total = 0.0;
+    if (motion.x.empty()) return total;
+    for (int k = 0; k < 4; ++k) total += value[k] * velocity_at(local[k], motion);
+    return total;
 }
 
 }  // namespace
@@ -262,36 +282,30 @@ void find_across(const Contacts& contacts) {
     }
 }
 
-namespace {
-
-/// This rank's share of the velocity of a place on a wire [m/s].
-double velocity_of(std::span<const int64_t, 4> local, std::span<const double, 4> value,
-                   const Motion& motion) {
-    double total = 0.0;
-    if (motion.x.empty()) return total;
-    for (int k = 0; k < 4; ++k) total += value[k] * velocity_at(local[k], motion);
-    return total;
+void superpose(const Contacts& contacts, std::span<const double> force) {
+    superpose(contacts, {force.data(), size(force), 1}, contacts.motion);
 }
 
-}  // namespace
-
-void superpose(const Contacts& contacts, std::span<const double> force) {
-    for (int64_t i = 0; i < size(force); ++i) {
-        if (force[i] == 0.0) continue;
+void superpose(const Contacts& contacts, Array2<const double> forces, const Motion& motion) {
+    for (int64_t i = 0; i < forces.rows; ++i) {
         const auto& [low, high] = contacts.touches[i].filled;
         const auto answer = part(contacts.answers.by_force[i], low, high);
-        add_answer(force[i], answer, low, contacts.motion, contacts.motion_gains);
+        add_answer(forces[i], 1.0, answer, low, motion, contacts.motion_gains);
     }
 }
 
 void compensate(const Contacts& contacts, std::span<const int64_t> numbers,
                 std::span<const double> compensation) {
+    compensate(contacts, numbers, {compensation.data(), size(compensation), 1}, contacts.motion);
+}
+
+void compensate(const Contacts& contacts, std::span<const int64_t> numbers,
+                Array2<const double> compensations, const Motion& motion) {
     const auto& [start, at, width, data] = contacts.link_columns;
-    for (size_t k = 0; k < numbers.size(); ++k) {
-        if (compensation[k] == 0.0) continue;
+    for (int64_t k = 0; k < size(numbers); ++k) {
         const int64_t d = numbers[k];
         const auto answer = part(data, at[d], at[d] + width[d]);
-        add_answer(-compensation[k], answer, start[d], contacts.motion, contacts.motion_gains);
+        add_answer(compensations[k], -1.0, answer, start[d], motion, contacts.motion_gains);
     }
 }
 
@@ -358,28 +372,15 @@ void write_outputs(const TrainOutputs& outputs, std::span<const double> force,
     }
 }
 
-namespace {
-
-/// How far the contact of raked strip i is ahead of its middle [m].
-double lead_of(const Leads& leads, int64_t i, double middle) {
-    const auto middles = part(leads.middle, leads.first[i], leads.first[i + 1]);
-    const auto own = part(leads.lead, leads.first[i], leads.first[i + 1]);
-    if (middle >= middles.back()) return own.back();
-    const int64_t beyond = std::ranges::upper_bound(middles, middle) - middles.begin();
-    if (beyond == 0) return own[0];
-    const double before = middles[beyond - 1];
-    const double share = (middle - before) / (middles[beyond] - before);
-    return own[beyond - 1] + share * (own[beyond] - own[beyond - 1]);
-}
-
-}  // namespace
-
 void move_contacts(const TrainPlaces& places, double way) {
     for (size_t i = 0; i < places.start.size(); ++i) places.now[i] = places.start[i] + way;
     const Leads& leads = places.leads;
     for (int64_t i = 0; i < size(leads.contact); ++i) {
         double& here = places.now[leads.contact[i]];
-        here += lead_of(leads, i, here);
+        const auto of = [&](std::span<const double> all) {
+            return part(all, leads.first[i], leads.first[i + 1]);
+        };
+        here += line_at(of(leads.middle), of(leads.lead), here).first;
     }
 }
 

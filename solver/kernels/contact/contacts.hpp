@@ -176,6 +176,11 @@ void superpose(const Contacts& contacts, std::span<const double> force);
 /// Add the answers to compensations [N] of links with these numbers.
 void compensate(const Contacts& contacts, std::span<const int64_t> numbers,
                 std::span<const double> compensation);
+/// The same for other motions of the line side by side: forces (n, L) and compensations (m, L) in
+/// all of their lanes.
+void superpose(const Contacts& contacts, Array2<const double> forces, const Motion& motion);
+void compensate(const Contacts& contacts, std::span<const int64_t> numbers,
+                Array2<const double> compensations, const Motion& motion);
 /// Keep the velocities at the coming step's contacts, before the step.
 void begin_work(const Contacts& contacts);
 /// Add the work that contact forces (n,) [N] have done in the step which has ended. The wire's own

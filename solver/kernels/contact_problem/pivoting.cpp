@@ -150,23 +150,7 @@ bool all_finite(std::span<const double> numbers) {
 class Path {
   public:
     Path(const Map& of, std::span<const double> start, double width, const Room& room)
-        : of_(of),
-          start_(start),
-          width_(width),
-          n_(size(start)),
-          columns_(room.path.columns),
-          room_(room),
-          origin_(room.path.numbers[0].first(n_)),
-          zero_(room.path.numbers[1].first(n_ + 1)),
-          entering_(room.path.numbers[2].first(n_ + 1)),
-          weights_(room.path.numbers[3].first(n_ + 1)),
-          change_(room.path.numbers[4].first(n_ + 1)),
-          place_(room.path.numbers[5].first(n_)),
-          order_(room.path.counts[0].first(n_ + 1)),
-          first_(room.path.counts[1].first(n_ + 1)),
-          corner_(room.path.counts[2].first(n_ + 1)),
-          held_(room.path.counts[3].first(n_ + 1)),
-          all_(part(room.path.all, 0, n_ + 1)) {
+        : of_(of), start_(start), width_(width), room_(room) {
         std::ranges::fill(all_, true);
         std::ranges::fill(zero_, 0.0);
         zero_[n_] = 1.0;
@@ -280,15 +264,20 @@ class Path {
         return gone;
     }
 
+    std::span<double> numbers(int64_t k) const { return room_.path.numbers[k].first(n_ + 1); }
+    std::span<int64_t> counts(int64_t k) const { return room_.path.counts[k].first(n_ + 1); }
+
     const Map& of_;
     std::span<const double> start_;
     double width_;
-    int64_t n_;
-    Array2<double> columns_;
     const Room& room_;
-    std::span<double> origin_, zero_, entering_, weights_, change_, place_;
-    std::span<int64_t> order_, first_, corner_, held_;
-    std::span<bool> all_;
+    int64_t n_ = size(start_);
+    Array2<double> columns_ = room_.path.columns;
+    std::span<double> origin_ = numbers(0).first(n_), zero_ = numbers(1), entering_ = numbers(2),
+                      weights_ = numbers(3), change_ = numbers(4), place_ = numbers(5).first(n_);
+    std::span<int64_t> order_ = counts(0), first_ = counts(1), corner_ = counts(2),
+                       held_ = counts(3);
+    std::span<bool> all_ = part(room_.path.all, 0, n_ + 1);
 };
 
 }  // namespace

@@ -185,37 +185,6 @@ bool leaves_out(std::span<const double> force, std::span<const double> compensat
     return largest > bounds.loss[0];
 }
 
-Solved solve(const SmallProblem& problem) {
-    const auto& [heads, share, gap, pulls, tangents, coupled, to_solve_in, found, max_rounds] =
-        problem;
-    const auto& rows = share.rows;
-    const int64_t n = size(gap.place), count = static_cast<int64_t>(share.flags[0].rows);
-    if (!to_solve_in || n + count > to_solve_in->k || count > rows.capacity()) return {};
-    const Room& room = *to_solve_in;
-    bool finite = subtract(heads, share.line, share.present, gap);
-    for (int64_t i = 0; i < n; ++i) {
-        room.always[i] = pulls && share.present[i] != 0.0;
-        room.behind[i] = 0;
-    }
-    press(gap, tangents, room);
-    const auto force = room.solution.first(n);
-    auto find_first = [&](int64_t of) {
-        return find_solution(room.system(of), room.signs(of), max_rounds, room);
-    };
-    Found forces = find_first(n);
-    int64_t used = n;
-    if (forces.rounds > 0 && any_switched(rows, count, coupled, force)) {
-        couple(rows, count, coupled, tangents.by_depth, tangents.by_rate, room);
-        used = n + count;
-        const Found all = find_first(used);
-        forces = {all.rounds, all.pivoted || forces.pivoted};
-    }
-    const auto compensation = part(room.solution, n, used);
-    finite = under(gap, rows, force, compensation, found) && finite;
-    const bool complete = !leaves_out(force, compensation, rows, share.bounds, coupled);
-    return {forces.rounds, used, finite, complete, forces.pivoted};
-}
-
 namespace {
 
 /// Largest difference between the law and its last tangent, relative to the force.
@@ -257,32 +226,56 @@ bool agrees(const Affine& gap, const LinkRows& rows, std::span<const double> for
     return true;
 }
 
+/// Find contact forces and compensations for a law's tangents, in the gap without forces.
+Solved solve_tangents(const SmallProblem& problem) {
+    const auto& [heads, share, gap, pulls, tangents, coupled, own_room, found, max_rounds] =
+        problem;
+    const auto& rows = share.rows;
+    const int64_t n = size(gap.place), count = static_cast<int64_t>(share.flags[0].rows);
+    const Room& room = *own_room;
+    for (int64_t i = 0; i < n; ++i) {
+        room.always[i] = pulls && share.present[i] != 0.0;
+        room.behind[i] = 0;
+    }
+    press(gap, tangents, room);
+    const auto force = room.solution.first(n);
+    auto find_first = [&](int64_t of) {
+        return find_solution(room.system(of), room.signs(of), max_rounds, room);
+    };
+    Found forces = find_first(n);
+    int64_t used = n;
+    if (forces.rounds > 0 && any_switched(rows, count, coupled, force)) {
+        couple(rows, count, coupled, tangents.by_depth, tangents.by_rate, room);
+        used = n + count;
+        const Found all = find_first(used);
+        forces = {all.rounds, all.pivoted || forces.pivoted};
+    }
+    const auto compensation = part(room.solution, n, used);
+    const bool finite = under(gap, rows, force, compensation, found);
+    const bool complete = !leaves_out(force, compensation, rows, share.bounds, coupled);
+    return {forces.rounds, used, finite, complete, forces.pivoted};
+}
+
 }  // namespace
 
-Solved solve(const SmallProblem& problem, const std::optional<MarchedHertzLaw>& marched) {
-    if (!marched) return solve(problem);
-    const MarchedHertzLaw& law = *marched;
-    const auto& [depth, rate] = problem.found;
-    const Affine& gap = problem.gap;
-    const auto force = problem.room->solution.first(depth.size());
-    Solved solved{};
+Solved solve(const SmallProblem& problem, const std::optional<MarchedHertzLaw>& law) {
+    const auto& [heads, share, gap, pulls, tangents, coupled, room, found, max_rounds] = problem;
+    const int64_t n = size(gap.place), count = static_cast<int64_t>(share.flags[0].rows);
+    if (!room || n + count > room->k || count > share.rows.capacity()) return {};
+    if (!subtract(heads, share.line, share.present, gap)) return {};
     // Without a force heads stand highest: from there Newton's method comes from one side.
-    if (!subtract(problem.heads, problem.share.line, problem.share.present, gap)) return solved;
-    linearise(law, gap.place, gap.rate);
+    if (law) linearise(*law, gap.place, gap.rate);
     int64_t rounds = 0;
     bool pivoted = false;
     for (int64_t number = 0; number < kMostTangents; ++number) {
-        solved = solve(problem);
-        if (solved.rounds <= 0 || !solved.finite) return solved;
+        const Solved solved = solve_tangents(problem);
+        if (!law || solved.rounds <= 0 || !solved.finite) return solved;
         rounds += solved.rounds;
         pivoted = pivoted || solved.pivoted;
-        linearise(law, depth, rate);
-        const auto compensation = part(problem.room->solution, size(depth), solved.size);
-        if (agrees(gap, problem.share.rows, force, compensation, law, number)) {
-            solved.rounds = rounds;
-            solved.pivoted = pivoted;
-            return solved;
-        }
+        linearise(*law, found.depth, found.rate);
+        const auto compensation = part(room->solution, n, solved.size);
+        if (agrees(gap, share.rows, room->solution.first(n), compensation, *law, number))
+            return {rounds, solved.size, true, solved.complete, pivoted};
     }
     return {0, 0, true, false, false};
 }

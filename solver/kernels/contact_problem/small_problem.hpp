@@ -96,9 +96,6 @@ struct Solved {
     CATENARY_RECORD(rounds, size, finite, complete, pivoted)
 };
 
-/// Find contact forces and compensations for a law's tangents.
-Solved solve(const SmallProblem& problem);
-
 /// Fill in the gap without forces, and its decrease by forces; whether all of it is finite.
 bool subtract(const Affine& heads, const Affine& line, std::span<const double> present,
               const Affine& gap);

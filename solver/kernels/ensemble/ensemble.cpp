@@ -14,87 +14,70 @@ namespace catenary {
 namespace {
 
 /// Fill in the reserve of each link from `begin` to `end` in all scenes, from the reserves at rest.
-template <int64_t L>
-[[gnu::always_inline]] inline void find_reserves(const Motion& motion, const Links& links,
-                                                 const double* rest, int64_t begin, int64_t end,
-                                                 double* result) {
-    using Scenes = SideBySide<L>;
-    const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
-    const double *s = motion.shares.data(), *weight = links.weights.data;
-    const int64_t* unknown = links.unknowns.data;
-    const int64_t m = links.unknowns.columns;
-    for (int64_t link = begin; link < end; ++link) {
-        typename Scenes::Numbers of_x{}, of_y{}, of_z{};
-        for (int64_t k = m * link; k < m * (link + 1); ++k) {
-            const int64_t place = unknown[k] * L;
-            of_x += weight[k] * Scenes::at(x + place);
-            of_y += weight[k] * Scenes::at(y + place);
-            of_z += weight[k] * Scenes::at(z + place);
-        }
-        const Reserve& law = links.law[link];
-        const auto stretch = s[0] * of_x + s[1] * of_y + s[2] * of_z;
-        Scenes::at(result + L * link) = Scenes::at(rest + L * link) + law.stiffness * stretch +
-                                        law.damping * (s[3] * of_y + s[4] * of_z);
-    }
-}
 CATENARY_FOR_TARGETS
 void find_reserves(const Motion& motion, const Links& links, const double* rest, int64_t begin,
                    int64_t end, double* result) {
-    with_lanes(motion.spacing, [&](auto n) __attribute__((always_inline)) {
-        find_reserves<n>(motion, links, rest, begin, end, result);
+    with_lanes(motion.spacing, [&](auto lanes) __attribute__((always_inline)) {
+        using Scenes = SideBySide<lanes>;
+        const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
+        const double *s = motion.shares.data(), *weight = links.weights.data;
+        const int64_t* unknown = links.unknowns.data;
+        const int64_t m = links.unknowns.columns;
+        for (int64_t link = begin; link < end; ++link) {
+            typename Scenes::Numbers of_x{}, of_y{}, of_z{};
+            for (int64_t k = m * link; k < m * (link + 1); ++k) {
+                const int64_t place = unknown[k] * lanes;
+                of_x += weight[k] * Scenes::at(x + place);
+                of_y += weight[k] * Scenes::at(y + place);
+                of_z += weight[k] * Scenes::at(z + place);
+            }
+            const Reserve& law = links.law[link];
+            const auto stretch = s[0] * of_x + s[1] * of_y + s[2] * of_z;
+            Scenes::at(result + lanes * link) = Scenes::at(rest + lanes * link) +
+                                                law.stiffness * stretch +
+                                                law.damping * (s[3] * of_y + s[4] * of_z);
+        }
     });
 }
 
 /// Take forces of links with these reserves into their extremes. `none` (L,) is 0 of scenes that
 /// take part, infinite of the others.
-template <int64_t L>
-[[gnu::always_inline]] inline void take_forces(std::span<const Reserve> laws,
-                                               const double* reserves, const double* none,
-                                               double* least, double* largest) {
-    using Scenes = SideBySide<L>;
-    const typename Scenes::Numbers left_out = Scenes::at(none), nothing{};
-    for (int64_t link = 0; link < size(laws); ++link) {
-        const Reserve& law = laws[link];
-        const typename Scenes::Numbers reserve = Scenes::at(reserves + L * link);
-        const auto whole = law.carried * reserve, part = whole - law.released * reserve;
-        const auto force = reserve < nothing ? part : whole;
-        typename Scenes::InMemory &low = Scenes::at(least + L * link),
-                                  &high = Scenes::at(largest + L * link);
-        const auto down = force + left_out, up = force - left_out;
-        low = down < low ? down : low;
-        high = up > high ? up : high;
-    }
-}
 CATENARY_FOR_TARGETS
 void take_forces(std::span<const Reserve> laws, const double* reserves,
                  std::span<const double> none, double* least, double* largest) {
-    with_lanes(size(none), [&](auto n) __attribute__((always_inline)) {
-        take_forces<n>(laws, reserves, none.data(), least, largest);
+    with_lanes(size(none), [&](auto lanes) __attribute__((always_inline)) {
+        using Scenes = SideBySide<lanes>;
+        const typename Scenes::Numbers left_out = Scenes::at(none.data()), nothing{};
+        for (int64_t link = 0; link < size(laws); ++link) {
+            const Reserve& law = laws[link];
+            const typename Scenes::Numbers reserve = Scenes::at(reserves + lanes * link);
+            const auto whole = law.carried * reserve, part = whole - law.released * reserve;
+            const auto force = reserve < nothing ? part : whole;
+            typename Scenes::InMemory &low = Scenes::at(least + lanes * link),
+                                      &high = Scenes::at(largest + lanes * link);
+            const auto down = force + left_out, up = force - left_out;
+            low = down < low ? down : low;
+            high = up > high ? up : high;
+        }
     });
 }
 
 /// Take displacements of unknowns into their largest ones, as `take_forces`.
-template <int64_t L>
-[[gnu::always_inline]] inline void take_uplift(const Motion& motion,
-                                               std::span<const int64_t> unknowns,
-                                               const double* none, double* largest) {
-    using Scenes = SideBySide<L>;
-    const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
-    const double* s = motion.shares.data();
-    const typename Scenes::Numbers left_out = Scenes::at(none);
-    for (int64_t arm = 0; arm < size(unknowns); ++arm) {
-        const int64_t at = unknowns[arm] * L;
-        const auto up = s[0] * Scenes::at(x + at) + s[1] * Scenes::at(y + at) +
-                        s[2] * Scenes::at(z + at) - left_out;
-        typename Scenes::InMemory& high = Scenes::at(largest + L * arm);
-        high = up > high ? up : high;
-    }
-}
 CATENARY_FOR_TARGETS
 void take_uplift(const Motion& motion, std::span<const int64_t> unknowns,
                  std::span<const double> none, double* largest) {
-    with_lanes(size(none), [&](auto n) __attribute__((always_inline)) {
-        take_uplift<n>(motion, unknowns, none.data(), largest);
+    with_lanes(size(none), [&](auto lanes) __attribute__((always_inline)) {
+        using Scenes = SideBySide<lanes>;
+        const double *x = motion.x.data(), *y = motion.y.data(), *z = motion.z.data();
+        const double* s = motion.shares.data();
+        const typename Scenes::Numbers left_out = Scenes::at(none.data());
+        for (int64_t arm = 0; arm < size(unknowns); ++arm) {
+            const int64_t at = unknowns[arm] * lanes;
+            const auto up = s[0] * Scenes::at(x + at) + s[1] * Scenes::at(y + at) +
+                            s[2] * Scenes::at(z + at) - left_out;
+            typename Scenes::InMemory& high = Scenes::at(largest + lanes * arm);
+            high = up > high ? up : high;
+        }
     });
 }
 
@@ -125,26 +108,18 @@ void ScenePasses::step() {
 }
 
 void ScenePasses::after_stretch() {
-    part(tracked_.ranges.all(), 2 * n_followed_, 2 * n_followed_ + 4);
-    const auto before = tracked_.ranges[n_followed_], now = tracked_.ranges[n_followed_ + 1];
-    ++n_followed_;
-    find_reserves(now[0], before[0]);
-    find_reserves(before[1], now[1]);
-}
-
-void ScenePasses::find_reserves(int64_t begin, int64_t end) {
-    catenary::find_reserves(parts_.arrays.motion, tracked_.links, rest_.data, begin, end,
-                            found_.data());
-    for (int64_t link = begin; link < end; ++link)
-        for (int64_t s = 0; s < n(); ++s) reserves_[s][link] = found_[n() * link + s];
+    tracked_.behind(n_followed_++, [this](int64_t begin, int64_t end) {
+        find_reserves(parts_.arrays.motion, tracked_.links, rest_.data, begin, end, found_.data());
+        for (int64_t link = begin; link < end; ++link)
+            for (int64_t s = 0; s < n(); ++s) reserves_[s][link] = found_[n() * link + s];
+    });
 }
 
 void ScenePasses::take(const LineExtremes& extremes, std::span<const double> none) {
     const Motion& motion = parts_.arrays.motion;
     take_uplift(motion, extremes.arms, none, extremes.uplift.data);
     const auto laws = extremes.droppers.law;
-    catenary::find_reserves(motion, extremes.droppers, extremes.rest.data, 0, size(laws),
-                            found_.data());
+    find_reserves(motion, extremes.droppers, extremes.rest.data, 0, size(laws), found_.data());
     take_forces(laws, found_.data(), none, extremes.least.data, extremes.largest.data);
 }
 

@@ -42,7 +42,6 @@ class ScenePasses : private Around {
   private:
     void before() override { n_followed_ = 0; }
     void after_stretch() override;
-    void find_reserves(int64_t begin, int64_t end);
 
     PassParts parts_;
     PassLine line_;

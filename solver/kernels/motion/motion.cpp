@@ -139,26 +139,20 @@ double energy_of_switching(std::span<const double> displacement, const Links& li
 
 namespace {
 
-/// Fill in the forces of links from `begin` to `end` [N], positive where they pull.
-void forces_within(const Motion& motion, const Links& links, int64_t begin, int64_t end,
-                   std::span<double> result) {
+/// Fill in the forces of links from `begin` to `end` [N], positive where they pull, with those of
+/// bends beyond their reserves; `released` of a bend that pushes is below zero.
+void forces_within(const Motion& motion, const Links& links, const Dependents& bends, int64_t begin,
+                   int64_t end, std::span<double> result) {
     reserves_within(motion, links, begin, end, result);
     for (int64_t link = begin; link < end; ++link) {
         const Reserve& law = links.law[link];
         const double share = result[link] < 0.0 ? law.carried - law.released : law.carried;
         result[link] = share * result[link] + 0.0;  // no negative zero, as of a slack dropper
-    }
-}
-
-/// Add the forces of bends beyond their reserves to the forces [N] of links from `begin` to `end`;
-/// `released` of a bend that pushes is below zero.
-void add_bends(const Motion& motion, const Dependents& bends, int64_t begin, int64_t end,
-               std::span<double> result) {
-    if (bends.links.law.empty()) return;
-    for (int64_t link = begin; link < end; ++link)
+        if (bends.links.law.empty()) continue;
         for (int64_t b = bends.begin[link]; b < bends.begin[link + 1]; ++b)
             result[link] -=
                 bends.links.law[b].released * std::min(reserve_of(b, bends.links, motion), 0.0);
+    }
 }
 
 }  // namespace
@@ -169,12 +163,11 @@ void show(const Shown& shown, std::span<double> uplift, std::span<double> droppe
     const auto first = shown.columns.first[begin], last = shown.columns.last[end];
     for (int64_t i = first[kArms]; i < last[kArms]; ++i)
         uplift[i] = displacement_at(shown.arms[i], shown.motion);
-    const auto& motion = shown.motion;
-    forces_within(motion, shown.droppers, first[kDroppers], last[kDroppers], dropper_force);
-    add_bends(motion, shown.dropper_bends, first[kDroppers], last[kDroppers], dropper_force);
+    forces_within(shown.motion, shown.droppers, shown.dropper_bends, first[kDroppers],
+                  last[kDroppers], dropper_force);
     if (shown.other_force.empty()) return;
-    forces_within(motion, shown.others, first[kOthers], last[kOthers], shown.other_force);
-    add_bends(motion, shown.other_bends, first[kOthers], last[kOthers], shown.other_force);
+    forces_within(shown.motion, shown.others, shown.other_bends, first[kOthers], last[kOthers],
+                  shown.other_force);
 }
 
 bool keep(const KeptMotions& kept, int64_t number, const Motion& motion, const Columns& columns) {

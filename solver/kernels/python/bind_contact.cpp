@@ -47,8 +47,9 @@ void offer_contact(py::module_& module) {
     offer(module, "heights", heights, "n=n, n, n");
     offer(module, "find_across", find_across, "");
     offer(module, "respond", respond, "n=n, n=n");
-    offer(module, "superpose", superpose, "n=n, n");
-    offer(module, "compensate", compensate, "*, k, k");
+    offer<void, const Contacts&, std::span<const double>>(module, "superpose", superpose, "n=n, n");
+    offer<void, const Contacts&, std::span<const int64_t>, std::span<const double>>(
+        module, "compensate", compensate, "*, k, k");
     offer(module, "begin_work", begin_work, "");
     offer(module, "add_work", add_work, "n=n, n");
     offer(module, "move_contacts", move_contacts, "");
@@ -59,8 +60,7 @@ void offer_contact(py::module_& module) {
     offer(module, "slack_under", slack_under, "w=3n+2, *, *, n");
     offer(module, "under", under, "n=n, w=3n+2 m=m.., n, m, n=n");
     offer(module, "leaves_out", leaves_out, "n, m, w=3n+2, n=n, *");
-    offer<Solved, const SmallProblem&, const std::optional<MarchedHertzLaw>&>(module, "solve",
-                                                                              solve, "n=n, n=n");
+    offer(module, "solve", solve, "n=n, n=n");
     offer(module, "find_solution", find_solution, "m=m, m=m");
     offer(module, "find_zero", find_zero_of, "");
     module.attr("MOST_TANGENTS") = kMostTangents;

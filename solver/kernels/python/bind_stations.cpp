@@ -7,7 +7,6 @@
 #include "python/from_python.hpp"
 #include "stations/elimination.hpp"
 #include "stations/known_layouts.hpp"
-#include "stations/records.hpp"
 
 namespace catenary::python {
 

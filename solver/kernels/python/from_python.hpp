@@ -354,31 +354,29 @@ auto taking(void (Model::*take)(Parts...), std::convertible_to<const char*> auto
 }
 
 /// A function with some of its arguments.
-class Bound {
-  public:
-    virtual ~Bound() = default;
-    virtual py::object call(const py::args& later) = 0;
+struct Bound {
+    std::function<py::object(const py::args&)> call;  ///< with the others
 };
 
 /// A function over arrays and records.
 struct Kernel {
     std::string name;
     const char* shapes;  ///< of the arguments not owned
-    std::function<std::unique_ptr<Bound>(const Kernel&, const py::args&)> bind;
+    std::function<Bound(const Kernel&, const py::args&)> bind;
 
-    std::unique_ptr<Bound> bound(const py::args& first) const { return bind(*this, first); }
-    py::object call(const py::args& given) const { return bound(given)->call(py::args()); }
+    Bound bound(const py::args& first) const { return bind(*this, first); }
+    py::object call(const py::args& given) const { return bound(given).call(py::args()); }
 };
 
 template <class R, class... A>
-class BoundFunction : public Bound {
+class BoundFunction {
   public:
     BoundFunction(R (*function)(A...), const Kernel& of, const py::args& first)
         : function_(function), name_(of.name), shapes_(of.shapes), n_bound_(first.size()) {
         if (n_bound_ > sizeof...(A)) throw py::type_error(too_many(n_bound_));
         convert(first, 0, kept_, sizes_, std::index_sequence_for<A...>());
     }
-    py::object call(const py::args& later) override {
+    py::object call(const py::args& later) {
         if (n_bound_ + later.size() != sizeof...(A))
             throw py::type_error(too_many(n_bound_ + later.size()));
         Kept kept;
@@ -430,8 +428,9 @@ class BoundFunction : public Bound {
 /// Offer a function in a module as a kernel whose arguments have these `shapes`.
 template <class R, class... A>
 void offer(py::module_& module, const char* name, R (*function)(A...), const char* shapes) {
-    auto bind = [function](const Kernel& of, const py::args& first) -> std::unique_ptr<Bound> {
-        return std::make_unique<BoundFunction<R, A...>>(function, of, first);
+    auto bind = [function](const Kernel& of, const py::args& first) -> Bound {
+        auto own = std::make_shared<BoundFunction<R, A...>>(function, of, first);
+        return {[own](const py::args& later) { return own->call(later); }};
     };
     module.attr(name) = Kernel{name, shapes, bind};
 }

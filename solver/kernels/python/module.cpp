@@ -5,7 +5,7 @@
 #include "base/targets.hpp"
 #include "loads/loads.hpp"
 #include "motion/motion.hpp"
-#include "motion/window.hpp"
+#include "motion/two_passes.hpp"
 #include "python/from_python.hpp"
 
 namespace catenary::python {
@@ -52,7 +52,6 @@ void offer_line(py::module_& module) {
     offer(module, "fourier_forth", fourier_forth, "n>0, n..");
 
     offer(module, "condense_spans", condense_spans, "z 3, 3 n b>0, 3 n k, z k k");
-    offer(module, "bridge", bridge, "k, k, k, m+1, m k, m k");
     offer(module, "add_waves", add_waves, "s k, k m, s m");
 }
 
@@ -61,7 +60,7 @@ void offer_line(py::module_& module) {
 PYBIND11_MODULE(native, module) {
     module.doc() = "Kernels of the time loop, compiled from C++.";
     py::class_<Bound>(module, "Bound", "A kernel with its first arguments.")
-        .def("__call__", &Bound::call);
+        .def("__call__", [](const Bound& own, const py::args& later) { return own.call(later); });
     py::class_<Kernel>(module, "Kernel", "A function over arrays and records.")
         .def("__call__", &Kernel::call)
         .def("bound", &Kernel::bound)

@@ -3,33 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <new>
+#include <stdexcept>
 
 #include "base/flush_to_zero.hpp"
 #include "simulation/catenary.h"
 
 namespace catenary {
-
-namespace {
-
-/// The first line of a file, which names the version of its form: all names of members are in it,
-/// so that a file of another form is refused.
-std::string header() {
-    auto names = std::string("Catenary prepared line 1: ") + PreparedLine::kMembers + "; ";
-    names += std::string(Ahead::kMembers) + "; " + StepParts::kMembers + "; " +
-             PassParts::kMembers + "; " + Contacts::kMembers + "; " + SmallProblem::kMembers +
-             "; " + HeadParts::kMembers + "; " + Window::kMembers + "; ";
-    for (size_t bytes : {sizeof(PreparedLine), sizeof(StepParts), sizeof(Touch), sizeof(Node),
-                         sizeof(Layout), sizeof(HeadParts)})
-        names += std::to_string(bytes) + " ";
-    return names + "\n";
-}
-
-}  // namespace
-
-void write_line(const std::string& path, PreparedLine& line) {
-    write_record(path, header(), line);
-}
 
 /// Part of a saved state besides inputs and blocks.
 struct Simulation::Place {
@@ -40,7 +21,7 @@ struct Simulation::Place {
 
 Simulation::Simulation(const std::string& path) {
     try {
-        file_sum_ = read_record(path, header(), line_, blocks_);
+        file_sum_ = read_line(path, line_, blocks_);
         make_steps();
     } catch (const std::runtime_error& error) {
         throw std::runtime_error(path + ": " + error.what());

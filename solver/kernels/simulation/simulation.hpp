@@ -5,9 +5,10 @@
 // that depend on time. A host takes steps, changes speed, lift, forces on heads and the motion of
 // bases between them, and keeps states to come back to. A step allocates no memory and never
 // waits.
+#include <cstddef>
+#include <memory>
 #include <string>
 
-#include "simulation/image.hpp"
 #include "steps/steps.hpp"
 
 namespace catenary {
@@ -45,8 +46,29 @@ struct PreparedLine {
     CATENARY_RECORD(steps, passes, tracked, window, heads, ahead)
 };
 
+/// A block of bytes that was read, in memory of its own, and where it stood when it was written.
+struct OwnBlock {
+    uintptr_t stood;
+    std::unique_ptr<std::byte[]> memory;
+    std::span<std::byte> bytes;
+    bool changes;  ///< whether any array in it is written
+};
+
+/// FNV-1a, by words of eight bytes: it detects damaged bytes, not forged ones.
+class CheckSum {
+  public:
+    void take(const void* data, size_t n);
+    uint64_t sum() const { return sum_; }
+
+  private:
+    uint64_t sum_ = 0xcbf29ce484222325u;
+};
+
 /// Write a line to a file. Throws std::runtime_error if that fails.
 void write_line(const std::string& path, PreparedLine& line);
+/// Read it, with the memory of its arrays; returns the checksum of the file. Throws
+/// std::runtime_error if it cannot be read, is of another version, or was damaged.
+uint64_t read_line(const std::string& path, PreparedLine& line, std::vector<OwnBlock>& blocks);
 
 /// Inputs of a pantograph that a host adds, from the next step on.
 struct Input {

@@ -4,5 +4,4 @@
 #define CATENARY_TARGET avx2
 #define CATENARY_TARGET_HAS_AVX
 #include "stations/scene_blocks.hpp"
-#include "stations/target.hpp"
 #endif

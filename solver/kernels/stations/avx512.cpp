@@ -8,5 +8,4 @@
 #define CATENARY_TARGET_HAS_AVX
 #define CATENARY_TARGET_HAS_AVX512
 #include "stations/scene_blocks.hpp"
-#include "stations/target.hpp"
 #endif

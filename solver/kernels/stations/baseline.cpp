@@ -6,7 +6,7 @@
 #else
 #include "stations/scene_blocks.hpp"
 #endif
-#include "stations/target.hpp"
+#include "stations/passes.hpp"
 
 #ifdef CATENARY_X86_TARGETS
 namespace catenary::baseline {

@@ -24,7 +24,42 @@ void reorder(const int8_t* place, int64_t n, int64_t scenes, const double* given
     });
 }
 
+/// Throws std::invalid_argument unless `numbers` hold those of each station from its one of
+/// `begins` on, of which a station of type t has sizes[t].
+void check_table(std::span<const int32_t> begins, std::span<const double> numbers,
+                 std::span<const uint8_t> station_type, const std::vector<int64_t>& sizes) {
+    for (int64_t i = 0; i < size(begins); ++i) {
+        const int64_t end = begins[i] + sizes.at(station_type.empty() ? 0 : station_type[i]);
+        if (begins[i] < 0 || end > size(numbers))
+            throw std::invalid_argument("stations have more numbers than their blocks");
+    }
+}
+
 }  // namespace
+
+Product ProductArrays::product(const std::vector<Layout>& layouts) const {
+    const int64_t n_stations = size(sections.starts);
+    if (first < 0 || (n_stations > 0 && n_stations < first + size(kinds) + 1))
+        throw std::invalid_argument("a product has fewer stations than rows");
+    std::vector<int64_t> sizes;
+    for (const Layout& layout : layouts)
+        sizes.push_back((layout.is_damped ? 2 : 1) * layout.of_row() * layout.pieces().vector());
+    const auto types = sections.station_type;
+    check_table(kinds, blocks, types.empty() ? types : part(types, first, size(types)), sizes);
+    return {.rows = {kinds.data(), blocks.data()}, .first = first, .places = sections};
+}
+
+Factored FactorArrays::factored(const std::vector<Layout>& layouts) const {
+    std::vector<int64_t> inverse, besides_of_both;
+    for (const Layout& layout : layouts) {
+        inverse.push_back(layout.size_of(upper(layout.own)) +
+                          (layout.is_sparse() ? 0 : layout.size_of(layout.own)));
+        besides_of_both.push_back(2 * layout.size_of(layout.beside));
+    }
+    check_table(kinds, blocks, sections.station_type, inverse);
+    check_table(beside_kinds, besides, sections.station_type, besides_of_both);
+    return {{kinds.data(), blocks.data()}, {beside_kinds.data(), besides.data()}, sections};
+}
 
 Line::Line(std::vector<std::unique_ptr<Kernels>> kernels,
            std::vector<std::vector<int>> station_types, int scenes)

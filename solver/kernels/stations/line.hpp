@@ -58,6 +58,37 @@ struct Ends {
     int64_t begin, end, low, high, middle;
 };
 
+/// Rows of a product: of each the place of its first number; the first row's station in `sections`.
+struct ProductArrays {
+    std::span<const int32_t> kinds;
+    std::span<const double> blocks;
+    int64_t first;
+    Sections sections;
+    CATENARY_RECORD(kinds, blocks, first, sections)
+    CATENARY_SHAPES("n, *, *, *")
+
+    /// Throws std::invalid_argument if there are fewer stations than rows and one at both ends, or
+    /// if blocks have fewer numbers than rows of these layouts.
+    Product product(const std::vector<Layout>& layouts) const;
+};
+
+/// Factors: of each station the place of its first number, and the same of the matrix's own blocks.
+struct FactorArrays {
+    std::span<const int32_t> kinds;
+    std::span<const double> blocks;
+    std::span<const int32_t> beside_kinds;
+    std::span<const double> besides;
+    int64_t low;                    ///< first station of a rank's own
+    std::span<const int64_t> ends;  ///< of `Ends`
+    Sections sections;
+    CATENARY_RECORD(kinds, blocks, beside_kinds, besides, low, ends, sections)
+    CATENARY_SHAPES("n, *, n, *, *, 5, n=n?")
+
+    /// Throws std::invalid_argument if blocks have fewer numbers than factors of these layouts.
+    Factored factored(const std::vector<Layout>& layouts) const;
+    const Ends& at() const { return *reinterpret_cast<const Ends*>(ends.data()); }
+};
+
 /// Numbers that take a state from one prediction to the next; see `PredictedLineState.changes`.
 struct Changes {
     double dt;                        ///< [s]

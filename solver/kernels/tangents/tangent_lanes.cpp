@@ -1,13 +1,20 @@
-// Loops over motions of the line side by side.
+// Free steps of the stations that move in one of several tangents, and their loads.
 #include "tangents/tangent_lanes.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "base/targets.hpp"
 
 namespace catenary {
 
 namespace {
+
+/// Steps from one look at outer stations to the next. The largest motion is found at each of the
+/// first so many looks, and then at every so many.
+constexpr int64_t kEvery = 8, kPeakEvery = 64;
+/// Share of the largest motion below which stations rest, as of windows; round-off is as large.
+constexpr double kAtRest = 1e-14;
 
 /// Sums of the march's motion with weights.
 template <int64_t L>
@@ -139,57 +146,68 @@ void load(const ChangedRows& rows, const Motion& march, int64_t n_lanes, int64_t
     });
 }
 
-/// Add the answer to a force in each of L lanes [N], of the unknowns from `begin` on, to motions.
-template <int64_t L>
-[[gnu::always_inline]] inline void add(const double* forces, const double* answer, int64_t n,
-                                       double* x, double* y, double* z, const double* gains) {
-    const typename SideBySide<L>::Numbers force = SideBySide<L>::at(forces),
-                                          to_x = gains[0] * force, to_y = gains[1] * force,
-                                          to_z = gains[2] * force;
-    for (int64_t j = 0; j < n; ++j) {
-        SideBySide<L>::at(x + L * j) += to_x * answer[j];
-        SideBySide<L>::at(y + L * j) += to_y * answer[j];
-        SideBySide<L>::at(z + L * j) += to_z * answer[j];
-    }
-}
-CATENARY_FOR_TARGETS
-void add_answer(const double* forces, std::span<const double> answer, int64_t begin,
-                const Motion& motion, std::span<const double> gains) {
-    const int64_t n = size(answer), lanes = motion.spacing;
-    const auto of = [&](std::span<double> all) {
-        return part(all, begin * lanes, (begin + n) * lanes).data();
-    };
-    double *x = of(motion.x), *y = of(motion.y), *z = of(motion.z);
-    with_lanes(lanes, [&](auto l) __attribute__((always_inline)) {
-        add<l>(forces, answer.data(), n, x, y, z, gains.data());
-    });
+}  // namespace
+
+LanePasses::LanePasses(PassParts parts, int64_t guard)
+    : parts_(std::move(parts)),
+      line_(parts_, static_cast<int>(parts_.arrays.motion.spacing)),
+      guard_(guard),
+      ends_(parts_.factors.at()) {
+    const int64_t n = size(parts_.factors.kinds), lanes = parts_.arrays.motion.spacing;
+    if (ends_.begin != 0 || ends_.low != 0 || ends_.high != n || ends_.end != n)
+        throw std::invalid_argument("tangents have a part of a line only");
+    for (int64_t station = 0; station <= n; ++station)
+        starts_.push_back(line_.line.start_of(line_.work, station) / lanes);
+    middle_ = ends_.middle;
+    if (guard_ > 0) ends_.begin = ends_.end = 0;
 }
 
-}  // namespace
+void LanePasses::wake(int64_t begin, int64_t end) {
+    if (begin >= end) return;
+    const auto first = std::ranges::upper_bound(starts_, begin) - 1,
+               last = std::ranges::lower_bound(starts_, end);
+    move(first - starts_.begin(), last - starts_.begin());
+}
+
+void LanePasses::move(int64_t begin, int64_t end) {
+    if (ends_.begin < ends_.end) {
+        begin = std::min(begin, ends_.begin);
+        end = std::max(end, ends_.end);
+    }
+    begin = std::max<int64_t>(0, begin);
+    end = std::min(n_stations(), end);
+    ends_ = {begin, end, begin, end, std::clamp(middle_, begin, end - 1)};
+}
+
+void LanePasses::follow(const Motion* march) {
+    const int64_t look = n_followed_++;
+    if (look % kEvery != 0 || (ends_.begin == 0 && ends_.end == n_stations())) return;
+    const bool is_peak = look < kEvery * kPeakEvery || look % (kEvery * kPeakEvery) == 0;
+    bool before = false, behind = false;
+    const int64_t first = std::min(ends_.begin + guard_, ends_.end),
+                  last = std::max(ends_.end - guard_, ends_.begin);
+    auto look_at = [&](const Motion& motion, std::vector<double>& peak) {
+        peak.resize(2 * motion.spacing);
+        if (is_peak) find_peak(motion, begin(), end(), peak);
+        before =
+            before || (ends_.begin > 0 && moves(motion, begin(), starts_[first], peak, kAtRest));
+        behind = behind ||
+                 (ends_.end < n_stations() && moves(motion, starts_[last], end(), peak, kAtRest));
+    };
+    look_at(parts_.arrays.motion, own_);
+    if (march) look_at(*march, of_march_);
+    if (before) move(ends_.begin - guard_, ends_.end);
+    if (behind) move(ends_.begin, ends_.end + guard_);
+}
+
+void LanePasses::step() {
+    if (ends_.begin < ends_.end) line_.line.step(line_.work, ends_, n_stations(), *this);
+}
 
 void load(const TangentLanes& lanes, const Motion& march) {
     const int64_t each = 2 * lanes.rows.part;  // unknowns
     load(lanes.rows, march, lanes.n(), lanes.passes->begin() / each,
          (lanes.passes->end() + each - 1) / each, lanes.loads.data());
-}
-
-void superpose(const Contacts& contacts, Array2<double> forces, const TangentLanes& lanes) {
-    for (int64_t i = 0; i < forces.rows; ++i) {
-        if (std::ranges::all_of(forces[i], [](double force) { return force == 0.0; })) continue;
-        const auto& [low, high] = contacts.touches[i].filled;
-        const auto answer = part(contacts.answers.by_force[i], low, high);
-        add_answer(forces[i].data(), answer, low, lanes.motion, contacts.motion_gains);
-    }
-}
-
-void compensate(const Contacts& contacts, std::span<const int64_t> numbers, Array2<double> forces,
-                const TangentLanes& lanes) {
-    const auto& [start, at, width, data] = contacts.link_columns;
-    for (size_t k = 0; k < numbers.size(); ++k) {
-        const int64_t d = numbers[k];
-        const auto answer = part(data, at[d], at[d] + width[d]);
-        add_answer(forces[k].data(), answer, start[d], lanes.motion, contacts.motion_gains);
-    }
 }
 
 }  // namespace catenary

@@ -135,13 +135,13 @@ void TangentSteps::follow(const TangentGroup& group, int64_t number) {
         find_places(tangent, own, tangent.speed * time);
         solve(tangent, own);
         for (int64_t i : acting_.contacts) forces(i, s) = solution_[i];
-        for (int64_t k = 0; k < n_links; ++k) of_links(k, s) = -solution_[n + acting_.rows[k]];
+        for (int64_t k = 0; k < n_links; ++k) of_links(k, s) = solution_[n + acting_.rows[k]];
         heads_.move(tangent.heads, solution_);
         remember(tangent);
         show(tangent, number);
     }
-    superpose(parts().contacts, forces, lanes);
-    compensate(parts().contacts, acting_.numbers, of_links, lanes);
+    superpose(parts().contacts, forces, lanes.motion);
+    compensate(parts().contacts, acting_.numbers, of_links, lanes.motion);
     show_arms(group, number);
 }
 

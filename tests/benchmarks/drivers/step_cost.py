@@ -21,7 +21,7 @@ from catenary.base.parallel import on_root
 from catenary.cases.run.scene_mesh import mesh_of
 from catenary.cases.scene.load import load_scene
 from catenary.cases.scene.scene import problem_of
-from catenary.solver.integrators.make_line import NewmarkLine
+from catenary.solver.integrators.line_integrator import make_line
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import distribute
 from catenary.solver.problem.problem import Problem
@@ -88,7 +88,7 @@ def main(n_spans: int, n_steps: int) -> None:
 
 def floor(problem: Problem, model: Model) -> float:
     """Fastest time [s] of one exact solve by a library and one product with K."""
-    line = NewmarkLine(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
+    line = make_line(MPI.COMM_SELF, model, distribute(model, 1, 0), problem.numerics)
     solves = [fastest(LIBRARIES[name](line, model)) for name in FASTEST]
     product = fastest(line.internal_forces)
     line.destroy()

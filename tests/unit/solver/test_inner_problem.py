@@ -230,6 +230,17 @@ def test_slow_impacts_with_much_hysteresis_find_their_force() -> None:
         assert abs(max(push, 0.0) - found.contact_force[0]) < 1e-5 * (1.0 + found.contact_force[0])
 
 
+def test_without_room_no_law_finds_its_force() -> None:
+    for law in (
+        LawInSteps(1, 5e4, 0.0, pulls=False),
+        HertzInSteps(HertzLaw(1e8, 1.5, 0.1, 0.01), 1),
+    ):
+        inner = InnerProblem(law, coupled(np.zeros((0, 0))))
+        problem = inner.problem(Heads(1).affine, LineResponse(1, 0))._replace(room=None)
+        rounds, _, finite, complete, _ = native.solve(problem, law.marched)
+        assert (rounds, finite, complete) == (0, False, False)
+
+
 def test_contacts_beside_droppers_that_lost_much_find_their_force() -> None:
     """A step of a random scene: droppers give back what drove the heads by 0.6 m and 470 m/s, and
     the rows of two contacts, one of which hardly pushes any more, differ by 1e4.

@@ -45,7 +45,6 @@ CALLS = {
     "polyline_at": (*np.zeros((2, N)), *np.zeros((3, S))),
     "correct": (*np.zeros((3, N)), 0.0, 0.0, 0.0),
     "add_waves": (np.zeros((S, K)), np.zeros((K, N)), np.zeros((S, N))),
-    "bridge": (*np.zeros((3, K)), np.ones(N + 1), np.zeros((N, K)), np.zeros((N, K))),
     "rotation_matrices": (np.zeros((N, 4)), np.zeros((N, 3, 3))),
     "move_bodies": (np.zeros((N + 1, 3)), np.ones((N + 1, 4)), np.zeros(6 * N)),
     "add_gyroscopic_moments": (np.zeros(6 * N), np.zeros((N, 3)), np.zeros((N + 1, 3))),
