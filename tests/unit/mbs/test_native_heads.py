@@ -7,7 +7,7 @@ import gc
 import numpy as np
 import pytest
 
-from catenary.mbs.head.pantograph import head_of
+from catenary.mbs.head.pantograph import head_of, weakly
 from catenary.mbs.head.stepping import Stepping
 from catenary.mbs.interface import drive_width, drives_by_name
 from catenary.mbs.lumped import LumpedData, LumpedPantograph
@@ -72,3 +72,18 @@ def test_a_pantograph_may_outlive_what_it_was_made_by() -> None:
     assert head.step(row)
     head.advance(np.zeros(1))
     assert position > before
+
+
+def test_a_step_of_a_model_that_is_gone_is_no_step() -> None:
+    class Model:
+        def predict(self, *arguments: object) -> None:
+            """As a pantograph that is stepped by Python."""
+
+    model, out = Model(), np.zeros(4)
+    arrays = native.HeadArrays(np.zeros((2, 1, 0)), np.zeros(0), out, NEWMARK, -1)
+    head = native.CalledHead(arrays, weakly(model.predict))
+    assert head.step(np.zeros(drive_width(1)))
+    del model
+    gc.collect()
+    with pytest.raises(ReferenceError, match="the pantograph of a compiled head is gone"):
+        head.step(np.zeros(drive_width(1)))
