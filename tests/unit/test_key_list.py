@@ -55,7 +55,10 @@ def test_a_filter_is_a_part_or_a_pattern(wanted: str, keys: list[str]) -> None:
             "requires effects.wind acts only with a table [wind.gusts] in a wind above 0 source:",
         ),
         ("line.steady_arm.holds_height", "default false; true or false"),
-        ("pantographs.*.masses_kg", "list of 1 to 20, each number from 0.001 to 1000; only of lumped"),
+        (
+            "pantographs.*.masses_kg",
+            "list of 1 to 20, each number from 0.001 to 1000; only of lumped",
+        ),
         ("petsc.march_pc_asm_type", "one of basic, restrict, interpolate, none"),
         ("train.end_m", "may be left out; number"),
     ],
