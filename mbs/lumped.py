@@ -237,6 +237,8 @@ class LumpedPantograph(SteppedHead):
         newmark = self._newmark
         predict_position = np.hstack([one, newmark.dt * one, newmark.predict_position * one])
         predict_velocity = np.hstack([none, one, newmark.predict_velocity * one])
+        # Not by SciPy, which nothing else of a chain needs, and which takes longer both to import
+        # and for so few masses.
         inverse = np.ascontiguousarray(
             np.linalg.inv(
                 np.diag(self._masses)

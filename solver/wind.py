@@ -436,7 +436,7 @@ def gust_loads(model: Model, wind: Wind) -> list[FieldLoad]:
         if parts:
             unknowns = np.concatenate([unknowns for unknowns, _, _ in parts])
             weights = sparse.vstack([width * weights for _, weights, width in parts]).tocsr()
-            fill = functools.partial(pressure.fill, plane is LEVEL)
+            fill = pressure.fill_leftward if plane is LEVEL else pressure.fill_upward
             found.append(FieldLoad(unknowns, weights, pressure.interval, fill))
     return found
 
@@ -457,29 +457,39 @@ class GustPressure:
         self._wind, self._mean = wind, across_at(wind, model.problem.tunnels, points)
         self._exposed = gust_exposure(wind, points, model.problem.tunnels)
         self._upward = GustField(wind, UPWARD, points, _apart(points))
-        self._across = _Across(wind, points, self._exposed)
+        self._points = points
         self.interval = self._upward.interval
 
-    def fill(self, leftward: bool, first: int, part: slice, slices: np.ndarray) -> None:
-        """Fill ``slices`` (m, k) with the force upwards, or ``leftward``, at the k points of
-        ``part`` and at the times (first + i) ``interval``."""
+    def fill_upward(self, first: int, part: slice, slices: np.ndarray) -> None:
+        """Fill ``slices`` (m, k) with the force upwards, at the k points of ``part`` and at the
+        times (first + i) ``interval``."""
+        self._fill_upward_gusts(first, part, slices)
+        speed = np.abs(self._mean[part])
+        if self._wind.quadratic:
+            across = self._mean[part] + self._across.at(first, part, slices.shape[0])
+            speed = np.hypot(across, slices)
+        slices *= speed
+        slices *= 0.5 * self._wind.density
+
+    def fill_leftward(self, first: int, part: slice, slices: np.ndarray) -> None:
+        """As ``fill_upward``, with the force to the left of the track."""
         wind, mean = self._wind, self._mean[part]
-        if not leftward or wind.quadratic:
-            self._upward.fill(first, part, slices)
-            slices *= self._exposed[part]
-        if not wind.quadratic and not leftward:
-            slices *= 0.5 * wind.density * np.abs(mean)
-            return
         across = self._across.at(first, part, slices.shape[0])
         if not wind.quadratic:
             slices[:] = wind.density * np.abs(mean) * across
             return
-        size = np.hypot(mean + across, slices)
-        if leftward:
-            slices[:] = size * (mean + across) - np.abs(mean) * mean
-        else:
-            slices *= size
+        self._fill_upward_gusts(first, part, slices)
+        across += mean
+        slices[:] = np.hypot(across, slices) * across - np.abs(mean) * mean
         slices *= 0.5 * wind.density
+
+    def _fill_upward_gusts(self, first: int, part: slice, slices: np.ndarray) -> None:
+        self._upward.fill(first, part, slices)
+        slices *= self._exposed[part]
+
+    @functools.cached_property
+    def _across(self) -> _Across:
+        return _Across(self._wind, self._points, self._exposed)
 
 
 def _apart(points: np.ndarray) -> float:

@@ -133,10 +133,10 @@ def optimise(
     >>> best.objective < best.shipped
     True
     """
-    own, how = scene_of(scene), {"jobs": jobs, "force": force, "say": saying(progress)}
+    given, say = scene_of(scene), saying(progress)
     with ending_as_python():
-        made = optima(lambda: (draft_of(own), task), out, **how)
-    return [_optimum(own, made.plan, one) for one in made.found]
+        made = optima(lambda: (draft_of(given), task), out, jobs=jobs, force=force, say=say)
+    return [_optimum(given, made.plan, found) for found in made.found]
 
 
 def _optimum(scene: Scene, plan: Plan, found: Found) -> Optimum:
@@ -204,9 +204,9 @@ def tolerance(
 
     from catenary.cases.studies.tolerance.output import table_of
 
-    how = {"jobs": jobs, "force": force, "say": saying(progress)}
+    say = saying(progress)
     with ending_as_python():
-        made = tolerances(lambda: (draft_of(scene), task), out, **how)
+        made = tolerances(lambda: (draft_of(scene), task), out, jobs=jobs, force=force, say=say)
     rows: Sequence[Mapping[str, Any]] = table_of(made.found).records()
     return pd.DataFrame(rows)
 

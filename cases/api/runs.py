@@ -156,8 +156,16 @@ def restart(
 
     tables = on_root(comm, lambda: scene_to_continue(own, until, stretch), takes_long=True)
     with _set_up(tables, progress, comm) as options:
-        how = {"force": force, "extends": until is not None, "only_summary": not report}
-        made = run_into(own, tables, comm, options, goes_on=True, **how)
+        made = run_into(
+            own,
+            tables,
+            comm,
+            options,
+            goes_on=True,
+            force=force,
+            extends=until is not None,
+            only_summary=not report,
+        )
         return _returned(made, comm)
 
 

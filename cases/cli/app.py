@@ -9,6 +9,7 @@ import dataclasses
 import inspect
 import os
 import re
+import sys
 from copy import copy
 from functools import partial
 from pathlib import Path
@@ -61,7 +62,8 @@ def narrowed(application: typer.Typer, words: Sequence[str]) -> typer.Typer:
 
     Typer makes the commands of all verbs before it calls one, which takes longer than quick verbs.
     """
-    called = [one for one in application.registered_commands if one.name == next(iter(words), None)]
+    name = next(iter(words), None)
+    called = [command for command in application.registered_commands if command.name == name]
     if called:
         application = copy(application)
         application.registered_commands = called
@@ -122,10 +124,10 @@ def _has_several_values(word: str) -> bool:
 def verb(name: str, *, serial: bool = False) -> Callable[[Command], Any]:
     """Adds a function as a verb, see ``console.guarded``; a serial one runs on rank 0 alone.
 
-    Its docstring is the help: sentences, then an example, then for each parameter ``name : help``
-    or ``name METAVAR : help``. A parameter with a default is an option of its name, one without an
-    argument; ``Annotated`` has other flags as texts, ``Bounds``, or all that Typer knows. One that
-    is a dataclass stands for its fields.
+    Its docstring is the help: sentences, then an example, then for each parameter, none left out,
+    ``name : help`` or ``name METAVAR : help``. A parameter with a default is an option of its
+    name, one without an argument; ``Annotated`` has other flags as texts, ``Bounds``, or all that
+    Typer knows. One that is a dataclass stands for its fields.
     """
 
     def added(function: Command) -> Any:
@@ -133,26 +135,30 @@ def verb(name: str, *, serial: bool = False) -> Callable[[Command], Any]:
         about["quiet"] = None, "Print nothing but errors."
         groups: dict[str, tuple[Any, dict[str, str]]] = {}
         parameters = []
-        for one in inspect.signature(function, eval_str=True).parameters.values():
-            if not dataclasses.is_dataclass(one.annotation):
-                parameters.append(_parameter(one.name, one.annotation, one.default, about))
+        for given in inspect.signature(function, eval_str=True).parameters.values():
+            if not dataclasses.is_dataclass(given.annotation):
+                parameters.append(_parameter(given.name, given.annotation, given.default, about))
                 continue
-            own = _fields_of(one.name, one.annotation)
-            groups[one.name] = one.annotation, {field: own[field].name for field in own}
-            parameters += own.values()
+            fields = _fields_of(given.name, given.annotation)
+            names = {field: parameter.name for field, parameter in fields.items()}
+            groups[given.name] = given.annotation, names
+            parameters += fields.values()
         quiet = Annotated[bool, typer.Option("-q", "--quiet")]
         parameters.append(_parameter("quiet", quiet, False, about))
         parameters.sort(key=_takes_the_rest)
         if about:
             raise ValueError(f"{name} has no parameter {', '.join(about)}")
+        unexplained = [one.name for one in parameters if not get_args(one.annotation)[1].help]
+        if unexplained and sys.flags.optimize < 2:  # above that there are no docstrings
+            raise ValueError(f"{name} has no help for {', '.join(unexplained)}")
         run = console.serial(function) if serial else function
 
-        def gathered(**words: Any) -> int | None:
-            for group, (make, fields) in groups.items():
-                words[group] = make(**{field: words.pop(own) for field, own in fields.items()})
+        def with_groups(**words: Any) -> int | None:
+            for group, (make, names) in groups.items():
+                words[group] = make(**{field: words.pop(named) for field, named in names.items()})
             return run(**words)
 
-        command: Any = console.guarded(gathered)
+        command: Any = console.guarded(with_groups)
         # The command line is made from signature and annotations.
         command.__signature__ = inspect.Signature(parameters)
         command.__annotations__ = {one.name: one.annotation for one in parameters}
@@ -166,9 +172,10 @@ def verb(name: str, *, serial: bool = False) -> Callable[[Command], Any]:
 serial_verb = partial(verb, serial=True)
 
 
-def _documented(own: Any) -> tuple[list[str], dict[str, tuple[str | None, str]]]:
+def _documented(what: Any) -> tuple[list[str], dict[str, tuple[str | None, str]]]:
     """Paragraphs of a docstring; metavar and help of its parameters by their names."""
-    text, _, section = inspect.cleandoc(own.__doc__ or "").partition("\n\nParameters\n----------\n")
+    whole = inspect.cleandoc(what.__doc__ or "")
+    text, _, section = whole.partition("\n\nParameters\n----------\n")
     about = {
         name: (metavar or None, " ".join(help.split()))
         for name, metavar, help in _PARAMETER.findall(section)
@@ -190,8 +197,8 @@ def _parameter(
     elif default is True:  # of which Typer makes a pair: --state and --no-state
         mark = typer.Option()
     else:
-        own = flags or ["--" + name.strip("_").replace("_", "-")]
-        mark = typer.Option(*own, min=least, max=most)
+        flags = flags or ["--" + name.strip("_").replace("_", "-")]
+        mark = typer.Option(*flags, min=least, max=most)
     metavar, mark.help = about.pop(name, (None, mark.help))
     mark.metavar = metavar or mark.metavar
     hint = Annotated[kind, mark]  # type: ignore[valid-type]
@@ -201,8 +208,8 @@ def _parameter(
 def _fields_of(name: str, group: Any) -> dict[str, inspect.Parameter]:
     """The fields of a dataclass as parameters, of other names where they state an option."""
     about: dict[str, tuple[str | None, str]] = {}
-    for own in reversed(group.__mro__):
-        about |= _documented(own)[1]
+    for base in reversed(group.__mro__):
+        about |= _documented(base)[1]
     found = {}
     for field, hint in get_type_hints(group, include_extras=True).items():
         default = getattr(group, field, inspect.Parameter.empty)
@@ -218,7 +225,7 @@ def _takes_the_rest(one: inspect.Parameter) -> bool:
     """Whether a parameter stands for all further arguments, so that it comes behind the others."""
     kind, mark = get_args(one.annotation)
     return isinstance(mark, ArgumentInfo) and any(
-        get_origin(own) is list for own in (kind, *get_args(kind))
+        get_origin(part) is list for part in (kind, *get_args(kind))
     )
 
 

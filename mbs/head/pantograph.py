@@ -27,12 +27,16 @@ NO_TIME = native.NewmarkFactors(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def weakly(method: Callable[..., Any]) -> Callable[..., None]:
-    """A method for a compiled head to call: heads belong to models, and must not keep these."""
+    """A method for a compiled head to call: heads belong to models, and must not keep these.
+
+    The call raises ReferenceError if the model is gone: no step may be left out in silence.
+    """
     own = WeakMethod(method)
 
     def call(*arguments: Any) -> None:
-        if (found := own()) is not None:
-            found(*arguments)
+        if (found := own()) is None:
+            raise ReferenceError("the pantograph of a compiled head is gone")
+        found(*arguments)
 
     return call
 

@@ -187,7 +187,7 @@ class InnerProblem:
         """Small problem as kernels solve it; ``room`` is another one when more links need it."""
         return native.SmallProblem(
             heads=heads,
-            share=line.share,
+            share=line.arrays,
             gap=self.gap,
             pulls=self.law.pulls,
             tangents=self.law.tangents,

@@ -39,7 +39,7 @@ class LineResponse:
     early_height, early_rate : (n,) wire heights [m] and rates [m/s] extrapolated from the line's
         motion; (0,) without ``early``
     rows : ``native.LinkRows``, whose ``numbers`` (capacity, 2 + 3 n) are sent
-    share : Share, all this as kernels take it
+    arrays : Share, all this as kernels take it
     bounds : Bounds; kept by reference
 
     Parameters
@@ -67,7 +67,7 @@ class LineResponse:
         self.rows = LinkRows(np.zeros((capacity, 2 + 3 * n)))
         self.present = np.ones(n)
         self.bounds = bounds or Bounds(*(np.full(size, np.inf) for size in (n, n, 1)))
-        self.share = Share(flags.view(FLAGS), self.present, self.line, self.rows, self.bounds)
+        self.arrays = Share(flags.view(FLAGS), self.present, self.line, self.rows, self.bounds)
 
     @property
     def count(self) -> int:

@@ -151,7 +151,7 @@ class OneSolve(Scheme):
             np.full(1, _FIRST_MARGIN if switches else _NO_MARGIN),
         )
         self._exchange = Exchange(self.comm, n, self.coupling.extrapolates, self._bounds)
-        self._respond = self.interaction.responder(self._exchange.share.share)
+        self._respond = self.interaction.responder(self._exchange.share.arrays)
         self._none = np.zeros(n)
         self._found: InnerSolution | None = None
         self._why: RunBroken | None = None
@@ -230,7 +230,7 @@ class OneSolve(Scheme):
         early = self.share.early_height, self.share.early_rate
         self._exchange.enlarge(n_links)
         self.share.early_height[:], self.share.early_rate[:] = early
-        self._respond = self.interaction.responder(self.share.share)
+        self._respond = self.interaction.responder(self.share.arrays)
 
     @property
     def traffic(self) -> tuple[int, int]:

@@ -47,7 +47,7 @@ from catenary.solver.linear.unit_responses import Windows, reach
 from catenary.solver.model import beam
 from catenary.solver.model.axial_motion import shape_of, tensioned_ends
 from catenary.solver.model.loads import ShapeLoad
-from catenary.solver.model.matrices import OperatorBands, part_of, whole_matrix
+from catenary.solver.model.matrices import OperatorBands, iterate_sums, whole_matrix
 from catenary.solver.model.model import Model
 from catenary.solver.model.partition import Ownership
 from catenary.solver.model.rest_shape import Equilibrium
@@ -144,7 +144,7 @@ def _about_rest(
     if changed.simulated.tensioner is not None and about.along.size:
         # Stops are where they were: displacements count from the first rest.
         ends, along = [end.node for end in tensioned_ends(first)], about.along.copy()
-        along[ends] = form.moved_along(np.array(ends))
+        along[ends] = form.moved_along(np.array(ends, dtype=int))
         about = replace(about, along=along)
     model = rebuilt(changed, form=about)
     unknowns, weights = model.droppers.direction
@@ -188,9 +188,11 @@ def acceleration_jump(
     first, last = ownership.first, ownership.last
     force = (after.load - before.load)[first:last]
     for line, sign in ((after, 1.0), (before, -1.0)):
-        rows, columns = (first, last), (0, displacement.size)
-        for of, values in (((0.0, 1.0, 0.0), displacement), ((0.0, 0.0, 1.0), velocity)):
-            force -= sign * (part_of(line.model, rows, columns, of, 0.0, 1) @ values)
+        # No matrix, as it would be multiplied once.
+        entries = iterate_sums(line.model, first, last, [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+        for rows, columns, (stiffness, damping) in entries:
+            pull = stiffness * displacement[columns] + damping * velocity[columns]
+            force -= sign * np.bincount(rows - first, pull, force.size)
         push = _compensation(line, displacement, velocity)
         force += sign * push[first:last]
     held = after.model.constrained[ownership.owned(after.model.constrained)] - first

@@ -26,11 +26,26 @@ from catenary.solver.model.model import Model
 from catenary.solver.problem.ends import Fixed
 from catenary.solver.problem.problem import Problem
 
-# Change from turn to turn of a line that is settled [m]; one that is round-off of its rest if it
-# falls no more, as of slack lines whose rest is found less exactly.
-_OF_PLANE = 1e-14, 1e-11
-# The same of rests which Newton's method finds to 1e-9 m.
-OF_REST = 1e-12, 1e-8
+
+class Changes(NamedTuple):
+    """Changes from turn to turn by which a line is judged.
+
+    Attributes
+    ----------
+    none : of one that is settled [m]
+    round_off : of one that is settled if they fall no more [m]
+    relative : whether both grow with the largest value above 1 m, as its round-off does
+    """
+
+    none: float
+    round_off: float
+    relative: bool
+
+
+# Slack lines have a rest that is found less exactly.
+_OF_PLANE = Changes(1e-14, 1e-11, relative=True)
+# Rests which Newton's method finds to 1e-9 m, wherever they are.
+OF_REST = Changes(1e-12, 1e-8, relative=False)
 # Turns at most.
 _MOST_TURNS = 40
 # Loads that are nothing, over the largest: round-off of droppers of 1e6 N/m.
@@ -79,11 +94,9 @@ def _node_at(model: Model, wire: str, x: float) -> int:
 def settled(
     turn: Callable[[np.ndarray], np.ndarray],
     first: np.ndarray,
-    changes: tuple[float, float] = _OF_PLANE,
+    changes: Changes = _OF_PLANE,
 ) -> np.ndarray:
     """The values that a ``turn`` returns as they are, from ``first`` ones. Not collective.
-
-    ``changes`` are those of values that are settled, and of round-off [m].
 
     Raises
     ------
@@ -95,8 +108,8 @@ def settled(
         found = turn(values)
         change = np.abs(found - values).max(initial=0.0)
         values = found
-        scale = max(1.0, float(np.abs(values).max(initial=0.0)))
-        if change < changes[0] * scale or before <= change < changes[1] * scale:
+        scale = max(1.0, float(np.abs(values).max(initial=0.0))) if changes.relative else 1.0
+        if change < changes.none * scale or before <= change < changes.round_off * scale:
             return values
         before = change
     raise InputError(

@@ -181,17 +181,20 @@ class RestNearby:
         InputError
             If there is none.
         """
-        potential, ends, rests = self._potential, self._follow, list[Rest]()
+        potential, ends = self._potential, self._follow
+        rest: Rest
+        moved = np.zeros(self._model.n_dofs)
         slack = self._switches & (potential.reserve(potential.known) < -_NO_FORCE)
 
         def turn(values: np.ndarray) -> np.ndarray:
-            moved = rests[-1].moved.copy() if rests else np.zeros(self._model.n_dofs)
+            nonlocal rest, moved, slack
             moved[ends.ends] = values
-            rests.append(self._find(moved, rests[-1].gap > 0.0 if rests else slack))
-            return rests[-1].moved[ends.masts]
+            rest = self._find(moved, slack)
+            moved, slack = rest.moved.copy(), rest.gap > 0.0
+            return rest.moved[ends.masts]
 
         settled(turn, np.zeros(ends.ends.size), OF_REST)
-        return rests[-1]
+        return rest
 
     def _find(self, moved: np.ndarray, slack: np.ndarray) -> Rest:
         """The rest near a displacement, from droppers that are slack there, with ends that follow

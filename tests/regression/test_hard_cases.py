@@ -9,6 +9,8 @@ import pytest
 from mpi4py import MPI
 from program import MPIRUN, catenary
 
+from catenary import InputError
+from catenary.cases.studies.hard import cases
 from catenary.cases.studies.hard.cases import HardCase, hard_cases
 from catenary.cases.studies.hard.checks import check_cases
 
@@ -73,3 +75,21 @@ def test_names_and_folders_that_cannot_be_are_refused(tmp_path: Path) -> None:
         (sentence,) = done.sentences
         assert said in sentence
     assert (tmp_path / "hard.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("sets", "chain"),
+    [
+        ('a = ["a"]', "a > a"),
+        ('a = ["b"]\nb = ["numerics.dt_s=1e-3", "c"]\nc = ["b"]', "b > c > b"),
+    ],
+)
+def test_sets_that_name_themselves_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sets: str, chain: str
+) -> None:
+    table = tmp_path / "hard.toml"
+    case = '[[cases]]\nname = "one"\nwhat = "hard"\nright = "well"'
+    table.write_text(f'base = "ac_simple"\ncommon = []\n[sets]\n{sets}\n{case}\n')
+    monkeypatch.setattr(cases, "TABLE", table)
+    with pytest.raises(InputError, match=rf"hard.toml has a set .* names itself \({chain}\)"):
+        cases.collection.__wrapped__()

@@ -23,8 +23,9 @@ pytestmark = [
     pytest.mark.study,
     pytest.mark.skipif(BROWSER is None, reason="there is no chromium or google-chrome"),
 ]
-# Pulls a frame with the mouse over the middle of every plot; tells how many marks each has, and
-# the ranges of the axes of its first panel before and after.
+# Pulls a frame with the mouse over the middle of every plot; tells how many marks each has, the
+# ranges of the axes of its first panel before and after, and the room between the buttons and the
+# legend and between the names of the axes and the caption [px], which is null without a legend.
 ZOOM = """
 <script>
 addEventListener("load", async () => {
@@ -44,7 +45,13 @@ addEventListener("load", async () => {
     mouse(document, "mouseup", 0.7);
     await new Promise(done => setTimeout(done, 400));
     const marks = plot.querySelectorAll(".lines path, .points path").length;
-    found.push({name: plot.ariaLabel, marks, before, after: ranges()});
+    const boxes = what => [...plot.querySelectorAll(what)].map(one => one.getBoundingClientRect());
+    const buttons = boxes(".modebar-group").map(box => box.bottom);
+    const names = boxes(".infolayer [class^=g-x]").map(box => box.bottom);
+    const caption = plot.closest("figure").querySelector("figcaption").getBoundingClientRect();
+    const legend = boxes(".legend .traces").map(box => box.top);
+    const gaps = [Math.min(...legend) - Math.max(...buttons), caption.top - Math.max(...names)];
+    found.push({name: plot.ariaLabel, marks, before, after: ranges(), gaps, legend, names});
   }
   const said = document.createElement("pre");
   said.id = "found";
@@ -134,6 +141,9 @@ def test_every_plot_is_drawn_and_zoomed(report: Path, tmp_path: Path) -> None:
     assert len(plots) == page.count('<div class="plot"') > 10
     for plot in plots:
         assert plot["marks"] > 0, plot["name"]
+        # Half of a letter's height.
+        assert plot["names"] and plot["gaps"][1] > 6.0, plot["name"]
+        assert not plot["legend"] or plot["gaps"][0] > 0.0, plot["name"]
         for (low, high), (start, end) in zip(plot["before"], plot["after"], strict=True):
             # The frame is 0.4 of the panel; a pixel of the panel's least side is 1 % of it.
             assert end - start == pytest.approx(0.4 * (high - low), abs=0.02 * (high - low))

@@ -130,6 +130,7 @@ def test_a_verb_is_a_command_of_the_application() -> None:
         name WHO : Name of the one
             who is greeted.
         loud : Whether all hear it.
+        most_N : Most of something.
         """
         console.say(f"hello {name} {loud} {most_N}")
 
@@ -145,6 +146,17 @@ def test_a_verb_is_a_command_of_the_application() -> None:
     hello.__doc__ = f"{hello.__doc__}quiet_one : Not there."
     with pytest.raises(ValueError, match="hello has no parameter quiet_one"):
         verb("hello")(hello)
+
+    def unexplained(loud: bool = False, most_N: float = 1.0) -> None:
+        """A verb with half of its help.
+
+        Parameters
+        ----------
+        loud : Whether all hear it.
+        """
+
+    with pytest.raises(ValueError, match="unexplained has no help for most_N"):
+        verb("unexplained")(unexplained)
 
     def bye(words: Misdescribed) -> None:
         """Another one."""

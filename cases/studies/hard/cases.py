@@ -151,10 +151,25 @@ class Collection(Table):
         default_factory=list, description="what each of these lines is put under"
     )
 
-    def assignments(self, words: list[str]) -> list[str]:
-        """Assignments of words that are such, or names of sets or lines."""
+    def assignments(self, words: list[str], within: tuple[str, ...] = ()) -> list[str]:
+        """Assignments of words that are such, or names of sets or lines, ``within`` such ones.
+
+        Raises
+        ------
+        InputError
+            If a set or line names itself, directly or by others.
+        """
         named = {line.name: line.set for line in self.lines} | self.sets
-        parts = (self.assignments(named[word]) if word in named else [word] for word in words)
+        if again := [word for word in words if word in within]:
+            chain_of_names = " > ".join([*within[within.index(again[0]) :], again[0]])
+            raise InputError(
+                f"{TABLE} has a set of assignments that names itself ({chain_of_names}): take a "
+                "name out of one of them"
+            )
+        parts = (
+            self.assignments(named[word], (*within, word)) if word in named else [word]
+            for word in words
+        )
         return [*chain(*parts)]
 
     def all_cases(self) -> list[HardCase]:
@@ -182,6 +197,7 @@ def collection() -> Collection:
     for entries in (found.cases, found.lines, found.conditions):
         if len({one.name for one in entries}) < len(entries):
             raise InputError(f"{TABLE} has two entries of one name")
+    found.assignments([*found.sets, *(line.name for line in found.lines)])
     return found
 
 

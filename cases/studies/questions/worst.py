@@ -291,7 +291,7 @@ def gust_forces(rest: LineAtRest, when: Sequence[tuple[float, float, float, floa
         low = max(round(begin / pressure.interval), 0)
         high = round(stop / pressure.interval)
         slices = np.zeros((high - low + 1, last - first))
-        pressure.fill(False, low, slice(first, last), slices)
+        pressure.fill_upward(low, slice(first, last), slices)
         area = 0.0
         for wire in rest.problem.line.wires:
             for nodes in mesh.pieces(wire.name):

@@ -27,8 +27,9 @@ from catenary.base.errors import InputError
 _DASHES = {"-": "solid", "--": "dash", ":": "dot", "-.": "dashdot"}
 _SYMBOLS = {"o": "circle", "v": "triangle-down", "^": "triangle-up", "x": "x", "_": "line-ew-open",
             "<": "triangle-left", ".": "circle"}  # fmt: skip
-# Size of a figure's inch, and of room above the panels for the legend [px].
-_INCH, _ABOVE = 96, 60
+# Size of a figure's inch, and of room above the panels for Plotly's buttons and two rows of the
+# legend below them [px].
+_INCH, _ABOVE = 96, 30 + 60
 
 
 def script() -> str:
@@ -117,6 +118,8 @@ def _axes(axes: Axes, own: str, panels: Sequence[Axes]) -> dict[str, Any]:
             entry["tickvals"] = _numbers(axis.get_majorticklocs())
             texts = axis.get_major_formatter().format_ticks(list(axis.get_majorticklocs()))
             entry["ticktext"] = [text.replace("\n", "<br>") for text in texts]
+    # Near its ticks, away from what stands below: a caption, or the title of a panel.
+    x["title"]["standoff"] = 4
     if axes.get_aspect() == 1.0:
         y["scaleanchor"] = f"x{own}"
     alike = [

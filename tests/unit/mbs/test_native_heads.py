@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from catenary import RunBroken
 from catenary.mbs.build import Operation, make_pantograph
 from catenary.mbs.head.laws import Law
-from catenary.mbs.head.pantograph import Pantograph, head_of
+from catenary.mbs.head.pantograph import Pantograph, head_of, weakly
 from catenary.mbs.head.stepping import LateralPath, Lowering, Raising, Stepping
 from catenary.mbs.head.strips import Strips, Suspension, Turning, head_parts
 from catenary.mbs.interface import drive_width, drives_by_name
@@ -86,6 +86,21 @@ def test_a_pantograph_may_outlive_what_it_was_made_by() -> None:
     assert head.step(row)
     head.advance(np.zeros(1))
     assert position > before
+
+
+def test_a_step_of_a_model_that_is_gone_is_no_step() -> None:
+    class Model:
+        def predict(self, *arguments: object) -> None:
+            """As a pantograph that is stepped by Python."""
+
+    model, out = Model(), np.zeros(4)
+    arrays = native.HeadArrays(np.zeros((2, 1, 0)), np.zeros(0), out, NEWMARK, -1)
+    head = native.CalledHead(arrays, weakly(model.predict))
+    assert head.step(np.zeros(drive_width(1)))
+    del model
+    gc.collect()
+    with pytest.raises(ReferenceError, match="the pantograph of a compiled head is gone"):
+        head.step(np.zeros(drive_width(1)))
 
 
 # --- the lumped pantograph's contract with the coupling -------------------------------------------

@@ -309,7 +309,7 @@ def rows(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rows]:
     with March(MPI.COMM_SELF, *line_at_rest(problem, mesh_of(scene))):
         (scheme,) = schemes
         scheme.begin(DT)
-        respond = scheme.interaction.responder(scheme.share.share)
+        respond = scheme.interaction.responder(scheme.share.arrays)
 
         def found(push: tuple[float, float], pull: float) -> list[int]:
             bounds = scheme.share.bounds

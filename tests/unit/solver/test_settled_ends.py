@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from catenary import InputError
-from catenary.solver.statics.repeated_ends import settled
+from catenary.solver.statics.repeated_ends import OF_REST, settled
 
 REST = np.array([7.5, -0.3])
 
@@ -40,3 +40,10 @@ def test_values_that_do_not_settle_are_refused(noise: float, factor: float) -> N
         InputError, match="does not settle where line.ends says that it is periodic"
     ):
         settled(turns(noise, factor)[0], np.zeros(2))
+
+
+def test_a_rest_is_as_exact_where_ends_move_by_metres() -> None:
+    """Newton's method finds it to 1e-9 m there, too; turns change by twice the noise."""
+    with pytest.raises(InputError, match="moves by 1.2e-05 mm"):
+        settled(turns(6e-9)[0], np.zeros(2), OF_REST)
+    assert np.abs(settled(turns(4e-9)[0], np.zeros(2), OF_REST) - REST).max() < 1e-8

@@ -28,7 +28,7 @@ def small_problem() -> object:
     heads, response = affine(np.zeros(12), 2), LineResponse(2, 0)
     inner = InnerProblem(LawInSteps(2, 5e4, 0.0, pulls=False), no_links())
     problem, rows = inner.problem(heads, response), SimpleNamespace(numbers=response.rows.numbers)
-    return problem._replace(share=SimpleNamespace(**response.share._asdict() | {"rows": rows}))
+    return problem._replace(share=SimpleNamespace(**response.arrays._asdict() | {"rows": rows}))
 
 
 def system(m: int) -> tuple[object, ...]:
