@@ -168,7 +168,7 @@ def store_extremes(file: h5py.File, n_rows: int, extremes: Mapping[str, np.ndarr
         is_new = name not in place
         table = put_array(place, name, values)
         if is_new and name != ROWS:
-            describe_extremes(file, table, name)
+            describe_extremes(file, h5py.Dataset(table), name)
     seal_arrays(place, arrays)
 
 

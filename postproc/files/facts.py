@@ -54,7 +54,8 @@ FACTS: dict[str, Fact] = {
     "time_step": Fact("s", "time between two records", low=_POSITIVE, high=1e3),
     "shortest_step": Fact("s", "shortest step that the run may take", low=1e-15, high=1e3),
     "step_tolerance": Fact(
-        "N", "error of a contact force accepted in a step, NaN where steps are not adapted",
+        "N",
+        "error of a contact force accepted in a step, NaN where steps are not adapted",
         may_be_nan=True,
     ),
     "fixed_iterations": Fact(
@@ -65,8 +66,10 @@ FACTS: dict[str, Fact] = {
     "newmark_beta": Fact("-", "Newmark's beta of the line's integrator"),
     "newmark_gamma": Fact("-", "Newmark's gamma of the line's integrator"),
     "mass_weight": Fact(
-        "-", "weight of a step's start in the inertia forces (alpha_m of generalized alpha)",
-        low=-1.0, high=1.0,
+        "-",
+        "weight of a step's start in the inertia forces (alpha_m of generalized alpha)",
+        low=-1.0,
+        high=1.0,
     ),
     "force_weight": Fact(
         "-", "weight of a step's start in all other forces (alpha_f of generalized alpha)", high=1.0
@@ -75,7 +78,9 @@ FACTS: dict[str, Fact] = {
     "wave_speed": Fact(
         "m/s",
         "speed of the contact wire's slowest wave at the start, that of a string unless supports "
-        "and bending stiffness carry it; of several the smallest", low=_POSITIVE, high=1e6,
+        "and bending stiffness carry it; of several the smallest",
+        low=_POSITIVE,
+        high=1e6,
     ),
     "contact_wire_tension": Fact("N", "tension of a contact wire at the start", per=WIRE, low=1e-6),
     "contact_wire_mass": Fact("kg/m", "mass per length of a contact wire", per=WIRE, low=1e-9),
@@ -86,7 +91,9 @@ FACTS: dict[str, Fact] = {
     "contact_wire_lost_section": Fact(
         "-",
         "largest share of its section that a contact wire has lost by wear in the evaluation "
-        "stretch", per=WIRE, high=1.0,
+        "stretch",
+        per=WIRE,
+        high=1.0,
     ),
     "contact_wire_stiffness_damping": Fact(
         "s", "alpha of a contact wire's proportional damping C = alpha K + beta M", per=WIRE
@@ -97,7 +104,10 @@ FACTS: dict[str, Fact] = {
     "longest_element": Fact(
         "m",
         "length of the longest element of a contact wire in the evaluation stretch, of the "
-        "shortest one if the wire is not there", per=WIRE, low=_POSITIVE, high=1e9,
+        "shortest one if the wire is not there",
+        per=WIRE,
+        low=_POSITIVE,
+        high=1e9,
     ),
     "stiffest_dropper": Fact("N/m", "largest stiffness of a dropper"),
     "dropper_stiffness_damping": Fact(
@@ -107,7 +117,8 @@ FACTS: dict[str, Fact] = {
         "s", "the part of that alpha which is numerical damping of droppers stiff for the step"
     ),
     "slack_stiffness_share": Fact(
-        "-", "share of its stiffness that a pushed dropper keeps, 1 where droppers do not slacken",
+        "-",
+        "share of its stiffness that a pushed dropper keeps, 1 where droppers do not slacken",
         high=1.0,
     ),
     "periodic_start": Fact(
@@ -117,29 +128,38 @@ FACTS: dict[str, Fact] = {
     "strongest_gust": Fact(
         "-",
         "gust that is hardly exceeded, over the mean wind, where drag is linearised about that; "
-        "NaN without such gusts", may_be_nan=True,
+        "NaN without such gusts",
+        may_be_nan=True,
     ),
     "static_force": Fact("N", "static force of a pantograph", per=PANTOGRAPH),
     "actuator_force": Fact(
         "N",
         "constant force of the actuator of a multibody pantograph at its static force, NaN for "
-        "others", per=PANTOGRAPH, low=-_MOST, may_be_nan=True,
+        "others",
+        per=PANTOGRAPH,
+        low=-_MOST,
+        may_be_nan=True,
     ),
     "touching_mass": Fact(
         "kg",
         "mass that one contact meets first: a strip on its suspension, or its share of the head",
-        per=PANTOGRAPH, low=1e-9,
+        per=PANTOGRAPH,
+        low=1e-9,
     ),
     "strip_half_length": Fact(
-        "m", "half length of the strips of a pantograph, NaN if it is not known",
-        per=PANTOGRAPH, may_be_nan=True,
+        "m",
+        "half length of the strips of a pantograph, NaN if it is not known",
+        per=PANTOGRAPH,
+        may_be_nan=True,
     ),
     "contact_stiffness": Fact(
         "N/m",
         "stiffness of the contact, of a law that is not linear its tangent at the static force; "
-        "infinite where head and wire cannot part", per=PANTOGRAPH, high=math.inf,
+        "infinite where head and wire cannot part",
+        per=PANTOGRAPH,
+        high=math.inf,
     ),
-}  # fmt: skip
+}
 
 
 def facts_of(problem: Problem, mesh: LineMesh, dropper_length: np.ndarray) -> dict[str, np.ndarray]:

@@ -13,6 +13,7 @@ one, or has a table in it. Not collective.
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import stat
@@ -23,7 +24,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5l, h5o, h5s
+from h5py import h5d, h5l, h5o, h5p, h5s, h5t
 
 from catenary.base.errors import InputError
 
@@ -56,19 +57,42 @@ class Damage(Exception):
     """A file is damaged; the message is a clause that follows its name."""
 
 
-def put_array(group: h5py.Group, name: str, values: Any) -> h5py.Dataset:
-    """Store an array or text in place of an earlier one of its name; returns its table.
+def put_array(group: h5py.Group, name: str, values: Any) -> h5d.DatasetID:
+    """Store an array in place of an earlier one of its name; returns its table.
 
-    One of the same shape and type is overwritten where it stands, so that the file does not grow;
-    by HDF5's own call, as a flush does so with each array of a state.
+    One of the same shape and type is overwritten where it stands, so that the file does not grow.
+    Text and what else is no number goes through h5py.
     """
-    if name in group:
-        array, old = np.asarray(values, order="C"), h5d.open(group.id, name.encode())
-        if old.shape == array.shape and old.dtype == array.dtype:
+    # A flush does so with each array of a state. HDF5's own calls take a fourth to a third of the
+    # time of h5py's general ones, which find out anew what is the same for all of ours: numbers in
+    # contiguous arrays, written as they are.
+    array, key = np.asarray(values, order="C"), name.encode()
+    is_plain = array.dtype.kind in "fiu"
+    if key in group.id:
+        old = h5d.open(group.id, key)
+        if is_plain and old.shape == array.shape and old.dtype == array.dtype:
             old.write(h5s.ALL, h5s.ALL, array)
-            return h5py.Dataset(old)
+            return old
         del group[name]
-    return group.create_dataset(name, data=values)
+    if not is_plain:
+        return group.create_dataset(name, data=values).id
+    space = h5s.create_simple(array.shape) if array.ndim else h5s.create(h5s.SCALAR)
+    made = h5d.create(group.id, key, _number_type(array.dtype), space, _how_to_create())
+    if array.size:
+        made.write(h5s.ALL, h5s.ALL, array)
+    return made
+
+
+@functools.cache
+def _how_to_create() -> h5p.PropDCID:
+    how = h5p.create(h5p.DATASET_CREATE)
+    how.set_obj_track_times(False)
+    return how
+
+
+@functools.cache
+def _number_type(dtype: np.dtype) -> h5t.TypeID:
+    return h5t.py_create(dtype, logical=True)
 
 
 def set_attribute(place: h5py.HLObject, name: str, value: Any) -> None:

@@ -379,7 +379,7 @@ def _write_head(
         create_checked(file, name, array)
     facts = file.create_group("facts")
     for name, value in header.facts.items():
-        dataset = put_array(facts, name, value)
+        dataset = h5py.Dataset(put_array(facts, name, value))
         set_attribute(dataset, "unit", FACTS[name].unit)
         set_attribute(dataset, "meaning", FACTS[name].meaning)
     seal_arrays(facts, header.facts)

@@ -56,6 +56,8 @@ def largest(unit: str) -> float:
 
 # Marks an attribute that is stored as JSON text.
 JSON = object()
+# Marks an attribute on which no figure of a report depends: a damaged one takes its default.
+DISPENSABLE = object()
 # The default of one that is not there where it does not apply.
 MISSING: Any = None
 
@@ -136,7 +138,7 @@ class RunAttributes(BaseModel):
     model_config = ConfigDict(strict=True, defer_build=True)
 
     case: Text
-    title: Text = ""
+    title: Annotated[Text, DISPENSABLE] = ""
     n_dofs: Positive
     system: Annotated[
         str, read_by(SYSTEMS.__getitem__), Field(description=f"one of {', '.join(SYSTEMS)}")
@@ -159,14 +161,14 @@ class RunAttributes(BaseModel):
     n_steps_planned: Positive
     n_steps_begun_for: Positive = MISSING
     n_ranks: Positive = 1
-    created: Text = "unknown"
-    outcome: str = Field(default=RUNNING, min_length=1, description="text")
+    created: Annotated[Text, DISPENSABLE] = "unknown"
+    outcome: Annotated[str, DISPENSABLE] = Field(default=RUNNING, min_length=1, description="text")
     n_steps: Count = MISSING
     simulated_s: _NotNegative = MISSING
     marched_s: _NotNegative = MISSING
-    march_wall_s: _NotNegative = MISSING
-    march_cpu_s: _NotNegative = MISSING
-    records_wall_s: _NotNegative = MISSING
+    march_wall_s: Annotated[_NotNegative, DISPENSABLE] = MISSING
+    march_cpu_s: Annotated[_NotNegative, DISPENSABLE] = MISSING
+    records_wall_s: Annotated[_NotNegative, DISPENSABLE] = MISSING
     config: Annotated[dict[str, Any], JSON, Field(description="a scene as JSON")]
     versions: Annotated[dict[str, Any], JSON] = Field(default={}, description="a table")
     effects_on: _Effects
@@ -199,7 +201,7 @@ class RunAttributes(BaseModel):
     )
     detour: Text = ""
     window: Text = ""
-    phase_wall_s: _Numbers = {}
+    phase_wall_s: Annotated[_Numbers, DISPENSABLE] = {}
     inner_iterations: _Numbers = {}
     watched: Annotated[dict[str, Number | list[str]], JSON, read_by(_read_watched)] = Field(
         default={}, description="numbers of the march's watch, with sentences"

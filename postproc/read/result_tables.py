@@ -44,6 +44,7 @@ from catenary.postproc.read.validation import (
     read_attributes,
     scan,
     table_values,
+    valid_until,
 )
 from catenary.solver.time_loop.views import channels
 
@@ -156,7 +157,7 @@ class ValidatedFile:
         self.sizes: dict[str, int] = {}
         self.facts: dict[str, np.ndarray] = {}
         try:
-            self.attrs = read_attributes(self._file, RunAttributes)
+            self.attrs, self._faults = read_attributes(self._file, RunAttributes)
             if not (self.attrs.get("rules") or self.attrs.get("edition")):
                 raise Damage('its attribute "rules" is missing')
             known = self.attrs.get("line_record")
@@ -166,7 +167,10 @@ class ValidatedFile:
             check_tables(self._file, self.record, self.sizes, self.attrs["n_steps_planned"] + 1)
             self._check_fit()
         except Damage as error:
-            raise InputError(f"{self.path} is damaged: {error}; run the case again") from error
+            last = valid_until(self._file, self._complete)
+            usable = f"{_up_to(last)} and can be read with h5py; " if last == last else ""
+            what = "for a report run the case again" if usable else "run the case again"
+            raise InputError(f"{self.path} is damaged: {error}; {usable}{what}") from error
 
     def _refuse_other_format(self) -> None:
         try:
@@ -281,10 +285,10 @@ class ValidatedFile:
     @property
     def damage(self) -> list[str]:
         """A sentence that names the file's damage and what is used of it, none if it is valid."""
-        if not self.records.faults:
+        faults = [*self._faults, *self.records.faults]
+        if not faults:
             return []
-        faults = listed(self.records.faults)
-        return [f"{self.path.name} is damaged: {faults}; {_up_to(self.records.last)}."]
+        return [f"{self.path.name} is damaged: {listed(faults)}; {_up_to(self.records.last)}."]
 
     def __contains__(self, path: str) -> bool:
         return is_there(self._file, path)
@@ -433,7 +437,7 @@ class MarchedFile:
         self.damage: list[str] = []
         self.has_energies = False
         n = len(tables["time"])
-        self.records = Records([n, 0, n], [], float(tables["time"][-1]) if n else float("nan"))
+        self.records = Records([n, 0, n], {}, [], float(tables["time"][-1]) if n else float("nan"))
         self.record = LineRecord()
         n_pantographs = tables["channels/contact_force"].shape[1]
         self.attrs.setdefault("n_strips", [1] * n_pantographs)

@@ -420,15 +420,16 @@ class Results(TrainOfRun):
         return filtered_in(self._file, (self._length, self.n_pantographs), index)
 
     def rows(self, name: str, part: slice) -> np.ndarray:
-        """The rows ``part`` of channel ``name``, shape (rows, columns), NaN where the line is not
-        recorded."""
+        """The rows ``part`` of channel ``name``, shape (rows, columns), NaN where it is damaged and
+        where the line is not recorded."""
         columns, n_places = self.recorded_columns(name), self._n_places(name)
         part, table = self._within(name, part), self._table(name)
-        if table is not None and columns.size == n_places:
+        valid = self._valid(name, part)
+        if table is not None and columns.size == n_places and valid == part:
             return np.asarray(table[part])
         whole = np.full((part.stop - part.start, n_places), np.nan)
         if table is not None:
-            whole[:, columns] = table[part]
+            whole[: valid.stop - valid.start, columns] = table[valid]
         return whole
 
     def column(self, name: str, index: int, part: slice | None = None) -> np.ndarray:
@@ -436,9 +437,11 @@ class Results(TrainOfRun):
         to ``stop``; NaN as in ``rows``."""
         part = self._within(name, part or slice(None))
         table, place = self._table(name), np.flatnonzero(self.recorded_columns(name) == index)
-        if table is None or not place.size:
-            return np.full(part.stop - part.start, np.nan)
-        return hdf5.column(table, part, int(place[0]))
+        values = np.full(part.stop - part.start, np.nan)
+        if table is not None and place.size:
+            valid = self._valid(name, part)
+            values[: valid.stop - valid.start] = hdf5.column(table, valid, int(place[0]))
+        return values
 
     def blocks(self, name: str) -> Iterator[tuple[slice, np.ndarray]]:
         """All rows of a channel in order, by blocks: which rows, and their values as ``rows``."""
@@ -457,10 +460,11 @@ class Results(TrainOfRun):
         if table is None:
             return
         numbers = self.recorded_columns(name)
-        n_rows, step = self.n_rows(name), (table.chunks or (1,))[0]
+        valid = self._valid(name, slice(0, self.n_rows(name)))
+        step = (table.chunks or (1,))[0]
         for first in range(0, numbers.size, hdf5.COLUMNS_AT_ONCE):
             columns = slice(first, min(first + hdf5.COLUMNS_AT_ONCE, numbers.size))
-            for part in hdf5.row_blocks(n_rows, columns.stop - first, step):
+            for part in hdf5.row_blocks(valid.stop, columns.stop - first, step):
                 if not hdf5.unwritten(table, part, columns):
                     yield part, numbers[columns], np.asarray(table[part, columns])
 
@@ -486,7 +490,7 @@ class Results(TrainOfRun):
         table = self._table(name)
         if table is None or (of_line and not self.line_record.whole):
             return np.full((2, self._n_places(name)), np.nan)
-        return hdf5.extremes(table, self.n_rows(name))
+        return hdf5.extremes(table, self._valid(name, slice(0, self.n_rows(name))).stop)
 
     def has(self, name: str) -> bool:
         """Whether a channel was recorded, and can be read."""
@@ -511,6 +515,11 @@ class Results(TrainOfRun):
         """A part of the rows of a channel that can be read."""
         start, stop, _ = part.indices(self.n_rows(name))
         return slice(start, max(start, stop))
+
+    def _valid(self, name: str, part: slice) -> slice:
+        """The rows of a part, from ``start`` to ``stop``, before a damaged one of the channel."""
+        n = self._file.records.damaged.get(self._path(name), part.stop)
+        return slice(part.start, max(part.start, min(part.stop, n)))
 
     def _n_places(self, name: str) -> int:
         """Columns that a channel has if all are recorded."""

@@ -31,6 +31,7 @@ from catenary.postproc.files.run_schema import (
     ALL_COLUMNS,
     CLOCKS,
     COLUMNS,
+    DISPENSABLE,
     JSON,
     RUNNING,
     SIZES,
@@ -42,6 +43,8 @@ from catenary.solver.time_loop.views.channels import RUN, Channel
 
 # Faults of a file that one sentence names.
 _MOST_NAMED = 3
+# Rows of a run whose number is not known.
+_ANY = 10**12
 # A time may be this share of a step off its place.
 _OFF = 1e-3
 
@@ -68,49 +71,61 @@ def names_in(file: h5py.File, path: str) -> list[str]:
         return []
 
 
-def read_attributes(file: h5py.File, model: type[BaseModel]) -> dict[str, Any]:
-    """Valid root attributes as Python's own values, lists and tables decoded.
+def read_attributes(file: h5py.File, model: type[BaseModel]) -> tuple[dict[str, Any], list[str]]:
+    """Valid root attributes as Python's own values, lists and tables decoded, and faults.
 
     One that is missing has the default of ``model`` if that has one; attributes that it does not
-    declare are taken as they are.
+    declare are taken as they are. An attribute that is ``DISPENSABLE`` has its default also where
+    it is damaged, which is told as a clause.
 
     Raises
     ------
     Damage
-        If one is missing that has none, invalid, or not the sealed one.
+        If another one is missing that has no default, invalid, or not the sealed one.
     """
+    values, faults = {}, {}
     try:
-        values = {name: text_of(value) for name, value in file.attrs.items()}
+        for name in set(file.attrs) - {ATTRIBUTE_SUMS}:
+            try:
+                values[name] = text_of(file.attrs[name])
+            except HDF5_ERRORS:
+                faults[name] = "cannot be read"
     except HDF5_ERRORS as error:
         raise Damage("one of its attributes cannot be read") from error
-    values.pop(ATTRIBUTE_SUMS, None)
     try:
         broken = broken_seals(file, values)
     except HDF5_ERRORS as error:
         raise Damage("the checksums of its attributes cannot be read") from error
     for name in broken:
-        how = "differs from its checksum" if name in values else "is missing"
-        raise Damage(f'its attribute "{name}" {how}')
+        faults.setdefault(name, "differs from its checksum" if name in values else "is missing")
     for name in values.keys() & model.model_fields.keys():
         if JSON in model.model_fields[name].metadata:
             values[name] = _decoded(values[name])
-    _validate(values, model)
+    faults = {**_invalid_attributes(values, model), **faults}
+    clauses = {name: f'its attribute "{name}" {words}' for name, words in faults.items()}
+    for name, clause in clauses.items():
+        if name not in model.model_fields or DISPENSABLE not in model.model_fields[name].metadata:
+            raise Damage(clause)
+        values.pop(name, None)
     for name, field in model.model_fields.items():
         if field.get_default() is not None and not field.is_required():
             values.setdefault(name, field.get_default())
-    return values
+    return values, list(clauses.values())
 
 
-def _validate(values: dict[str, Any], model: type[BaseModel]) -> None:
+def _invalid_attributes(values: dict[str, Any], model: type[BaseModel]) -> dict[str, str]:
+    """Faults of attributes by name, as the ends of clauses."""
     try:
         model.model_validate(values)
     except ValidationError as error:
-        row = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        name = str(row["loc"][0])
-        words = "is missing"
-        if name in values:
-            words = f"is not {model.model_fields[name].description}{_shown(values[name])}"
-        raise Damage(f'its attribute "{name}" {words}') from error
+        rows = error.errors(include_url=False, include_context=False, include_input=False)
+        return {
+            name: f"is not {model.model_fields[name].description}{_shown(values[name])}"
+            if name in values
+            else "is missing"
+            for name in (str(row["loc"][0]) for row in rows)
+        }
+    return {}
 
 
 def _decoded(text: Any) -> Any:
@@ -177,12 +192,14 @@ class Records(NamedTuple):
     Attributes
     ----------
     rows : of the steps, the energies and the line's channels, before the first damage in a table
-        of these
+        of these; in a channel of the line damage ends that channel alone
+    damaged : path of a damaged channel of the line -> its rows before; later ones read as NaN
     faults : the faults, as clauses
     last : time of the last valid step [s], NaN without one
     """
 
     rows: list[int]
+    damaged: dict[str, int]
     faults: list[str]
     last: float
 
@@ -202,10 +219,17 @@ def check_tables(file: h5py.File, record: LineRecord, sizes: dict[str, int], mos
         Number of rows that the run plans.
     """
     steps, energies, line = growing_tables(record)
-    for tables in (steps, energies if is_there(file, "energy") else {}, line):
-        for path, channel in tables.items():
-            if tables is line or path == "time" or channel.essential or is_there(file, path):
-                _check_shape(file, path, channel, sizes, most)
+    _check_steps(file, steps, sizes, most)
+    for path, channel in {**(energies if is_there(file, "energy") else {}), **line}.items():
+        _check_shape(file, path, channel, sizes, most)
+
+
+def _check_steps(
+    file: h5py.File, tables: dict[str, Channel], sizes: dict[str, int], most: int
+) -> None:
+    for path, channel in tables.items():
+        if path == "time" or channel.essential or is_there(file, path):
+            _check_shape(file, path, channel, sizes, most)
 
 
 def _check_shape(
@@ -253,26 +277,51 @@ def scan(
         Counts that ``committed_rows`` found earlier, None to find them now.
     """
     n_complete, fault = committed_rows(file) if complete is None else complete
-    clauses = [fault] if fault else []
-    rows = []
+    rows, damaged, clauses = list[int](), dict[str, int](), [fault] if fault else []
     for number, tables in enumerate(growing_tables(record)):
+        of_line = number == len(CLOCKS) - 1
         usable = {p: c for p, c in tables.items() if is_there(file, p)}
         n = n_complete[number] if usable else 0
         for path, channel in usable.items():
             if file[path].shape[0] < n:
                 clauses.append(f"{path} ends after {file[path].shape[0]} of {n} records")
                 n = file[path].shape[0]
-            may_be_nan = channel.may_be_nan or (number == 2 and record.window is not None)
+            may_be_nan = channel.may_be_nan or (of_line and record.window is not None)
             valid = valid_rows(file[path], n, largest(channel.unit), may_be_nan)
             if path == CLOCKS[number]:
                 valid = min(valid, _in_order(file[path], valid, dt if number == 0 else None))
             if valid < n:
                 clauses.append(f"{path} is damaged from record {valid} on")
-                n = valid
+                if of_line and path != CLOCKS[number]:
+                    damaged[path] = valid
+                else:
+                    n = valid
         rows.append(n)
     clauses += _missing_end(about, rows[0])
-    last = float(file["time"][rows[0] - 1]) if rows[0] else float("nan")
-    return Records(rows, clauses, last)
+    return Records(rows, damaged, clauses, _time_before(file, rows[0]))
+
+
+def valid_until(file: h5py.File, complete: tuple[list[int], str] | None = None) -> float:
+    """Time of the last step up to which all tables of steps are valid in a file whose head is
+    damaged [s]; NaN if there is none, or a table is missing or of the wrong kind.
+
+    ``complete`` are counts that ``committed_rows`` found earlier, None to find them now.
+    """
+    steps, *_ = growing_tables(LineRecord())
+    try:
+        _check_steps(file, steps, {}, _ANY)
+        n = (committed_rows(file) if complete is None else complete)[0][0]
+        for path, channel in steps.items():
+            if is_there(file, path):
+                n = min(n, file[path].shape[0])
+                n = valid_rows(file[path], n, largest(channel.unit), channel.may_be_nan)
+        return _time_before(file, _in_order(file["time"], n, None))
+    except (Damage, *HDF5_ERRORS):
+        return math.nan
+
+
+def _time_before(file: h5py.File, n: int) -> float:
+    return float(file["time"][n - 1]) if n else math.nan
 
 
 def valid_rows(table: h5py.Dataset, n_rows: int, most: float, may_be_nan: bool) -> int:

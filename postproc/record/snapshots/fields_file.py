@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 
+from catenary.base.errors import InputError
 from catenary.base.files import new_part
 from catenary.postproc.files.disk import (
     MARGIN,
@@ -33,7 +34,7 @@ from catenary.postproc.files.disk import (
     write_whole,
 )
 from catenary.postproc.files.disk_errors import reason
-from catenary.postproc.files.hdf5 import Damage, open_own, put_array, set_attribute
+from catenary.postproc.files.hdf5 import HDF5_ERRORS, Damage, open_own, put_array, set_attribute
 from catenary.postproc.record.snapshots.contents import (
     FORMAT,
     PLACES,
@@ -210,12 +211,14 @@ class FieldsFile:
         """Close the file and write its text, or remove a file that was never published."""
         if self._handle < 0:
             return
-        if self.is_published:
-            self._describe()
-        else:
-            self._made_as.unlink(missing_ok=True)
-        os.close(self._handle)
-        self._handle = -1
+        try:
+            if self.is_published:
+                self._describe()
+            else:
+                self._made_as.unlink(missing_ok=True)
+        finally:
+            os.close(self._handle)
+            self._handle = -1
 
     def _describe(self) -> None:
         """Write the XDMF file of the snapshots that are there, if it can be written."""
@@ -227,7 +230,7 @@ class FieldsFile:
             try:
                 with open_own(self.path, locking=False) as file:
                     write_whole(self._xdmf, xdmf_of(file, read_fields(file), self.path.name))
-            except OSError as error:
+            except (*HDF5_ERRORS, InputError, Damage) as error:  # another program changed the file
                 sentence = "writing %s failed (%s); `catenary paraview` does without it"
                 logger.warning(sentence, self._xdmf, reason(error))
 

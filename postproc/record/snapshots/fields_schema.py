@@ -93,7 +93,7 @@ def read_fields(file: h5py.File) -> FieldTables:
     Damage
         If anything is missing, of another kind, or does not fit the rest.
     """
-    about = read_attributes(file, FieldsAttributes)
+    about, _ = read_attributes(file, FieldsAttributes)  # all of which are needed
     clock = _table(file, "times", np.dtype("<f8"), (None,))
     n_planned = clock.shape[0]
     if n_planned > _MOST_SNAPSHOTS:

@@ -100,9 +100,7 @@ REFUSED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
         gone("line_channels/arm_uplift"),
         "line_channels/arm_uplift is missing or cannot be read",
     ),
-    "title": (put("title", np.arange(3)), 'its attribute "title" is not text'),
     "facts": (put("pantographs", "[3]"), '"pantographs" is not a list of tables'),
-    "outcome": (put("outcome", np.arange(3)), 'its attribute "outcome" is not text'),
     "no channels": (gone("channels"), "channels/contact_position is missing"),
     "masts": (value("line/support_x", 3, -1e3), "line/support_x does not ascend"),
     "node beyond": (value("line/droppers", 0, 10**7), "line/droppers names number 10000000"),
@@ -130,6 +128,9 @@ REFUSED: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     ),
 }
 
+# Those after which no records of the steps can be read, as a table of these is missing.
+WITHOUT_RECORDS = {"no times", "no forces", "no channels"}
+
 
 @pytest.mark.parametrize("how", REFUSED)
 def test_what_no_report_can_be_made_of_is_refused(how: str, copy: Path) -> None:
@@ -142,7 +143,9 @@ def test_what_no_report_can_be_made_of_is_refused(how: str, copy: Path) -> None:
     sentence = str(refused.value)
     assert sentence.startswith(f"{copy} is damaged: ") and "\n" not in sentence
     assert words in sentence
-    assert sentence.endswith("; run the case again")
+    assert sentence.endswith("run the case again")
+    whole = "; its records up to t = 8.000 s are valid and can be read with h5py; for a report"
+    assert (whole in sentence) == (how not in WITHOUT_RECORDS)
 
 
 # Damage after which there is a report: what is told, and how many records are used.
@@ -160,6 +163,9 @@ USED: dict[str, tuple[Callable[[h5py.File], None], str, int]] = {
         1601,
     ),
     "energies": (value("energy/kinetic", 3, 1e300), "energy/kinetic is damaged from", 1601),
+    "title": (put("title", np.arange(3)), 'its attribute "title" is not text', 1601),
+    "wall time": (put("march_wall_s", "long"), '"march_wall_s" is not a number of zero or', 1601),
+    "outcome": (put("outcome", np.arange(3)), 'its attribute "outcome" is not text', 1601),
     "no rows told": (value("complete_rows", 0, 0), "0 of 1601 records are valid", 0),
     "more rows": (value("complete_rows", 0, 10**9), "complete_rows is damaged", 1601),
 }
@@ -193,21 +199,43 @@ def test_a_report_is_drawn_around_the_damage(how: str, copy: Path) -> None:
     assert "run.h5 is damaged: " in (copy.parent / "report.html").read_text()
 
 
-def test_a_damaged_chunk_ends_the_records_of_its_kind(copy: Path, sound: Path) -> None:
+def test_a_damaged_chunk_ends_its_own_channel_of_the_line(copy: Path, sound: Path) -> None:
     with h5py.File(copy) as file:
         info = file["line_channels/dropper_force"].id.get_chunk_info(3)
     spoil(copy, info.byte_offset + 100)
     with Results(copy) as results, Results(sound) as before:
         (sentence,) = results.damage
         assert "line_channels/dropper_force is damaged from record 200 on" in sentence
-        assert results.time.size == before.time.size and results.line_time.size == 200
-        for name in ("dropper_force", "arm_uplift"):
-            found, expected = (r.channel(name) for r in (results, before))
-            np.testing.assert_array_equal(found, expected[:200])
-            np.testing.assert_array_equal(results.column(name, 3), found[:, 3])
-            np.testing.assert_array_equal(  # they are kept apart
-                results.extremes(name), before.extremes(name)
-            )
+        assert results.line_time.size == before.line_time.size
+        found, expected = (r.channel("dropper_force") for r in (results, before))
+        assert np.isnan(found[200:]).all()
+        np.testing.assert_array_equal(found[:200], expected[:200])
+        np.testing.assert_array_equal(results.column("dropper_force", 3), found[:, 3])
+        written = sum(values.size for _, _, values in results.written_blocks("dropper_force"))
+        assert written == found[:200].size
+        np.testing.assert_array_equal(*(r.channel("arm_uplift") for r in (results, before)))
+        np.testing.assert_array_equal(  # they are kept apart
+            results.extremes("dropper_force"), before.extremes("dropper_force")
+        )
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (put("title", "Another"), "differs from its checksum"),
+        (put("title", np.bytes_(b"\xff")), "cannot be read"),
+        (removed("title"), "is missing"),
+    ],
+)
+def test_a_damaged_title_takes_its_default(
+    damage: Callable[[h5py.File], None], words: str, copy: Path
+) -> None:
+    with h5py.File(copy, "r+") as file:
+        damage(file)
+    with Results(copy) as results:
+        (sentence,) = results.damage
+        assert f'its attribute "title" {words}; its records up to t = 8.000 s' in sentence
+        assert results.attributes["title"] == ""
 
 
 def test_damaged_forces_end_the_record_before_them(copy: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from catenary.postproc.record.snapshots.contents import (
     FIELDS,
     KINDS,
     MASTS,
+    SIZES,
     SLOPE,
     BlockTables,
     Course,
@@ -301,6 +303,38 @@ def test_a_text_that_cannot_be_written_is_told(
     with caplog.at_level("WARNING", "catenary.fields"):
         watcher.finish("done")
     assert f"writing {path} failed" in caplog.text and "catenary paraview" in caplog.text
+
+
+def odd_places(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file["contact_wire/first"][...] = -1
+
+
+def no_places(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        del file[SIZES]
+
+
+def linked_places(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file["link"] = h5py.SoftLink("/times")
+
+
+@pytest.mark.parametrize("damage", [odd_places, no_places, linked_places])
+def test_a_file_that_another_program_changed_ends_in_a_warning(
+    damage: Any, tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    march, path = make_march(n_steps=100), tmp_path / "fields.xdmf"
+    watcher = watch(march, path)
+    watcher.start(march.stage())
+    watcher.observe(march.view(0))
+    damage(tmp_path / "fields.h5")
+    own = f"/proc/{os.getpid()}/fd"
+    with caplog.at_level("WARNING", "catenary.fields"):
+        watcher.finish("done")
+    assert f"writing {path} failed" in caplog.text and len(caplog.records) == 1
+    opened = [os.path.realpath(one) for one in Path(own).iterdir()]
+    assert str(tmp_path / "fields.h5") not in opened
 
 
 @pytest.mark.process
