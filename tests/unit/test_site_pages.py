@@ -34,7 +34,7 @@ PRODUCT = [
     path
     for part in ("solver", "mbs", "meshgen", "postproc", "cases")
     for path in sorted((ROOT / part).rglob("*"))
-    if path.suffix in (".py", ".cpp", ".hpp")
+    if path.suffix in (".py", ".cpp", ".hpp", ".h")
 ]
 
 
@@ -65,6 +65,21 @@ def test_what_a_page_names_by_the_end_of_its_path_is_there() -> None:
         gone = {one for one in named if not any(path.endswith(f"/{one}") for path in there)}
         gone = {one for one in gone if not (ROOT / one).is_dir()}
         assert gone == set(), page
+
+
+def test_lines_of_parts_are_those_of_their_files() -> None:
+    page = (ROOT / "docs/development/size.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| [^|*]+ \| (`[^|]+`) \| (\d+) \|", page, re.M)
+    said = {where: int(lines) for where, lines in rows}
+    part_of = {path: where for where in said for path in re.findall(r"`([^`]+)`", where)}
+    found = dict.fromkeys(said, 0)
+    for file in [*PRODUCT, ROOT / "setup.py", *ROOT.glob(".setup/*.py"), *ROOT.glob(".site/*.py")]:
+        name = file.relative_to(ROOT).as_posix()
+        longest = max(filter(name.startswith, part_of), key=len)
+        found[part_of[longest]] += len(file.read_text(encoding="utf-8").splitlines())
+    assert found == pytest.approx(said, rel=0.1)
+    (in_all,) = map(int, re.findall(r"In all there are (\d+) lines", page))
+    assert sum(found.values()) == pytest.approx(in_all, rel=0.02)
 
 
 @pytest.mark.parametrize("page", THEORY, ids=label)
