@@ -22,6 +22,7 @@ from h5py import h5d, h5p, h5s, h5t
 
 from catenary.base.errors import InputError
 from catenary.base.files import new_part
+from catenary.meshgen.wires import SAME_PLACE
 from catenary.postproc.files.disk import (
     MARGIN,
     Cut,
@@ -296,7 +297,9 @@ class FieldsFile:
         ]
         for slots, places in zip(self._layout, self._places, strict=True):
             for name, table in slots.tables().items():
-                if not np.array_equal(known.blocks[slots.name].tables()[name], table):
+                there = known.blocks[slots.name].tables()[name]
+                # Another machine or version may have found the line at rest by other round-off.
+                if there.shape != table.shape or not (np.abs(there - table) <= SAME_PLACE).all():
                     raise ValueError(name)
             for kind in slots.kinds:
                 spans.append((places[kind.name], kind.item_bytes * slots.rows(kind)))

@@ -365,6 +365,21 @@ def test_no_snapshot_before_the_state_is_lost(
 
 
 @pytest.mark.process
+def test_fields_of_a_line_that_was_found_by_other_round_off_are_continued(
+    tmp_path: Path, make_march: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Another version, or another machine's processor, began the run."""
+    march, path = make_march(n_steps=1000), tmp_path / "fields.xdmf"
+    march.drive(watch(march, path), outcome="interrupted", last=620)
+    with h5py.File(tmp_path / "fields.h5", "r+") as file:
+        file["contact_wire/points"][:, 2] += 1e-9
+    with caplog.at_level("WARNING", "catenary.fields"):
+        march.drive(watch(march, path, resume=True), first_step=500)
+    assert not caplog.records
+    assert len(pyvista.get_reader(path).time_values) == 21
+
+
+@pytest.mark.process
 def test_a_snapshot_that_a_kill_left_half_written_is_replaced(
     tmp_path: Path, make_march: Any
 ) -> None:
