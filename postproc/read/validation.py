@@ -219,14 +219,16 @@ def check_tables(file: h5py.File, record: LineRecord, sizes: dict[str, int], mos
         Number of rows that the run plans.
     """
     steps, energies, line = growing_tables(record)
-    _check_steps(file, steps, sizes, most)
-    for path, channel in {**(energies if is_there(file, "energy") else {}), **line}.items():
+    _check_known(file, steps, sizes, most)
+    _check_known(file, energies if is_there(file, "energy") else {}, sizes, most)
+    for path, channel in line.items():
         _check_shape(file, path, channel, sizes, most)
 
 
-def _check_steps(
+def _check_known(
     file: h5py.File, tables: dict[str, Channel], sizes: dict[str, int], most: int
 ) -> None:
+    """Check tables that are there, and that the essential ones are: versions add others."""
     for path, channel in tables.items():
         if path == "time" or channel.essential or is_there(file, path):
             _check_shape(file, path, channel, sizes, most)
@@ -309,7 +311,7 @@ def valid_until(file: h5py.File, complete: tuple[list[int], str] | None = None) 
     """
     steps, *_ = growing_tables(LineRecord())
     try:
-        _check_steps(file, steps, {}, _ANY)
+        _check_known(file, steps, {}, _ANY)
         n = (committed_rows(file) if complete is None else complete)[0][0]
         for path, channel in steps.items():
             if is_there(file, path):
